@@ -1,0 +1,32 @@
+"""Build of the ROS 2 package hydraulic_bringup: every module in nodes/ and verbs/ is an executable."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "hydraulic_bringup"
+
+
+def executables() -> list[str]:
+    """One console script per public module of nodes/ and verbs/, named after the file."""
+    files = [p for part in ("nodes", "verbs") for p in sorted(Path(NAME, part).glob("[!_]*.py"))]
+    return [f"{p.stem} = {'.'.join(p.with_suffix('').parts)}:main" for p in files]
+
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={"": ["*.yaml", "*.eds", "*.html", "*.css", "*.js", "py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", sorted(str(p) for p in Path("launch").glob("*.launch.py"))),
+        (f"share/{NAME}/config", sorted(str(p) for p in Path("config").glob("*.yaml"))),
+    ],
+    zip_safe=False,
+    maintainer="Hydraulic Bench Maintainers",
+    maintainer_email="maintainers@hydraulic-bench.example.org",
+    license="Apache-2.0",
+    entry_points={"console_scripts": executables()},
+)
