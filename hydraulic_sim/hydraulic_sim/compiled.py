@@ -1,0 +1,97 @@
+"""Compiles the text of a composition, and keeps the machine code in a cache that is never stale.
+
+The cache folder is named after a hash of the generated text, of every effect file, of the shared kernels and of the
+versions of numba and Python: whatever changes the physics changes the folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numba
+
+from . import kernels
+from .compose import Layout, write_module
+from .registry import Library
+
+CACHE_VARIABLE = "HYDRAULIC_SIM_CACHE"
+
+
+class CompiledPlant:
+    """The compiled functions of one library (`rhs`, `run`) and the layout of their arrays."""
+
+    def __init__(self, library: Library) -> None:
+        self.layout = Layout(library)
+        self.module = _load(library)
+        self.rhs: Callable = self.module.rhs
+        self.run: Callable = self.module.run
+
+
+def cache_root() -> Path:
+    """Where compiled physics is kept: $HYDRAULIC_SIM_CACHE, or hydraulic_sim in the user's cache folder."""
+    named = os.environ.get(CACHE_VARIABLE)
+    if named:
+        return Path(named)
+    home = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
+    root = Path(home) / "hydraulic_sim"
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        return root if os.access(root, os.W_OK) else Path(tempfile.gettempdir()) / "hydraulic_sim"
+    except OSError:
+        return Path(tempfile.gettempdir()) / "hydraulic_sim"
+
+
+def _load(library: Library) -> ModuleType:
+    text = write_module(library)
+    digest = hashlib.sha256()
+    for part in (
+        text,
+        library.fingerprint,
+        Path(kernels.__file__).read_text(encoding="utf-8"),
+        numba.__version__,
+        platform.python_version(),
+    ):
+        digest.update(part.encode())
+    key = digest.hexdigest()[:20]
+    file = cache_root() / key / f"plant_{key}.py"
+    if not file.is_file():
+        _write_once(file, text)
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    module.__dict__["FUNCTIONS"] = {
+        f"{effect.name}.{which}": function
+        for effect in library.values()
+        for which, function in effect.functions().items()
+    }
+    sys.modules[spec.name] = module  # numba finds cached code again by the module's name
+    spec.loader.exec_module(module)
+    return module
+
+
+def _write_once(file: Path, text: str) -> None:
+    """Write atomically: two processes may compile the same physics at the same time."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=file.parent, suffix=".tmp")
+    with os.fdopen(handle, "w", encoding="utf-8") as stream:
+        stream.write(text)
+    os.replace(temporary, file)
+
+
+_COMPILED: dict[str, CompiledPlant] = {}
+
+
+def compiled(library: Library) -> CompiledPlant:
+    """The compiled plant of a library, compiled at most once per process."""
+    key = library.fingerprint
+    if key not in _COMPILED:
+        _COMPILED[key] = CompiledPlant(library)
+    return _COMPILED[key]

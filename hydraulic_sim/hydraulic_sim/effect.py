@@ -1,0 +1,147 @@
+"""What a physical effect is: one record that everything else derives from.
+
+An effect file (in `effects/`, or a user's own) defines one module constant ``EFFECT``. Its name is the file's
+name. ROS parameters, bounds of a fit, tables of a report and the documentation all read this record; there is
+no second list of effects anywhere.
+
+A kernel is an ordinary function of scalars; numba compiles it. Its *argument names* say what it wants:
+
+- a parameter or a state of the effect itself, by its name;
+- a signal of the plant (`slots.SIGNALS`), such as ``velocity`` or ``load_pressure``;
+- a base parameter (`base.PARAMETERS`), such as ``moving_mass``;
+- a parameter of another effect, declared in ``uses`` as ``{"argument": "effect.parameter"}`` (zero while that
+  effect is off);
+- in the per-sample slots, ``memory`` (the effect's own array) and ``dt`` [s].
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from .errors import EffectError
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One physical constant: its SI unit, default, allowed range and where the numbers come from.
+
+    ``null`` is the value at which the effect contributes exactly nothing; ``None`` marks a shape parameter, which
+    has no such value of its own. ``free`` says whether a fit may move it unless a model file says otherwise.
+    ``required`` marks a base parameter for which no default is sensible: a model file must give it.
+    """
+
+    name: str
+    unit: str
+    default: float
+    bounds: tuple[float, float]
+    description: str
+    source: str
+    null: float | None = None
+    free: bool = True
+    required: bool = False
+
+    def __post_init__(self) -> None:
+        low, high = self.bounds
+        if not low < high:
+            raise EffectError(f"parameter {self.name}: bounds {self.bounds} are not in rising order")
+        for label, value in (("default", self.default), ("null", self.null)):
+            if value is not None and not low <= value <= high:
+                raise EffectError(f"parameter {self.name}: {label} {value} lies outside {low}…{high} {self.unit}")
+        if not self.name.isidentifier():
+            raise EffectError(f"parameter name {self.name!r} is not a Python identifier")
+        if not self.source:
+            raise EffectError(f"parameter {self.name} names no source")
+
+
+@dataclass(frozen=True)
+class State:
+    """A state an effect adds to the plant.
+
+    ``kind`` "rate": the dynamics kernel returns its time derivative. ``kind`` "relaxation": the kernel returns
+    (rate [1/s], target); the state obeys ds/dt = rate·(target − s) and is integrated without a stability limit.
+    ``initial`` names the base parameter it starts from, or is a number.
+    """
+
+    name: str
+    unit: str
+    initial: float | str = 0.0
+    kind: str = "rate"
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("rate", "relaxation"):
+            raise EffectError(f"state {self.name}: kind {self.kind!r} is neither 'rate' nor 'relaxation'")
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect. Units are SI. See the module's docstring for the kernels' arguments.
+
+    ``slot`` is a key of `slots.SLOTS` and fixes what the kernel returns; ``dynamics`` returns one entry per state
+    (for a relaxation state a pair). ``memory`` is the number of values kept between samples. ``order`` sorts
+    effects within a slot. ``step_rate`` estimates the fastest rate [1/s] that the effect brings, from parameters
+    alone, so that the integrator's step can follow it. ``always_on`` marks base physics.
+    """
+
+    slot: str
+    summary: str
+    kernel: Callable
+    parameters: tuple[Parameter, ...]
+    equation: str
+    source: str
+    excited_by: str
+    confused_with: tuple[str, ...]
+    told_apart_by: str
+    states: tuple[State, ...] = ()
+    dynamics: Callable | None = None
+    memory: int = 0
+    uses: Mapping[str, str] = field(default_factory=dict)
+    order: int = 0
+    step_rate: Callable | None = None
+    always_on: bool = False
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        names = [p.name for p in self.parameters] + [s.name for s in self.states]
+        doubled = sorted({n for n in names if names.count(n) > 1})
+        if doubled:
+            raise EffectError(f"effect {self.name or '?'}: the names {doubled} appear twice")
+        if bool(self.states) != (self.dynamics is not None):
+            raise EffectError(f"effect {self.name or '?'}: states and a dynamics kernel go together")
+        if not self.always_on and all(p.null is None for p in self.parameters):
+            raise EffectError(f"effect {self.name or '?'}: no parameter has a null value")
+        for text in ("summary", "equation", "source", "excited_by", "told_apart_by"):
+            if not getattr(self, text).strip():
+                raise EffectError(f"effect {self.name or '?'}: {text} is empty")
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    def functions(self) -> dict[str, Callable]:
+        """The functions that are compiled: ``kernel`` and, with states, ``dynamics``."""
+        found = {"kernel": self.kernel}
+        if self.dynamics is not None:
+            found["dynamics"] = self.dynamics
+        return found
+
+    def null_values(self) -> dict[str, float]:
+        """Parameter values at which the effect contributes exactly nothing."""
+        return {p.name: p.default if p.null is None else p.null for p in self.parameters}
+
+
+def arguments(function: Callable) -> tuple[str, ...]:
+    """The argument names of a kernel, in order."""
+    return tuple(inspect.signature(function).parameters)
+
+
+def check_value(parameter: Parameter, value: float, where: str) -> float:
+    """Return ``value`` as float; raise `EffectError` when it is not finite or outside the parameter's bounds."""
+    low, high = parameter.bounds
+    number = float(value)
+    if not math.isfinite(number) or not low <= number <= high:
+        raise EffectError(f"{where}: {number:g} {parameter.unit} is outside {low:g} … {high:g} {parameter.unit}")
+    return number

@@ -1,0 +1,178 @@
+"""A model: which effects are on, the value of every parameter, and what is known about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from . import base, slots
+from .effect import Parameter, check_value
+from .errors import EffectError, ModelError
+from .registry import Library, library
+
+KINDS = ("hydraulic", "mechanical")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One parameter of a model: value [SI], where it comes from, whether a fit may move it and how far.
+
+    ``bounds`` [SI] lie within the library's; ``standard_error`` [SI] is there once fitted; ``printed`` keeps a
+    value as a source prints it, where it is not the one used.
+    """
+
+    value: float
+    source: str = ""
+    free: bool | None = None
+    bounds: tuple[float, float] | None = None
+    standard_error: float | None = None
+    printed: str | None = None
+    note: str | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model as a user keeps it in a file. Immutable: the ``with_`` methods return changed copies.
+
+    Keys are base parameters (``moving_mass``) and ``effect.parameter`` (``coulomb_friction.level``). A parameter
+    without an entry has the library's default.
+    """
+
+    name: str
+    entries: Mapping[str, Entry]
+    effects: tuple[str, ...] = ()
+    kind: str = "hydraulic"
+    description: str = ""
+    user_effects: tuple[Path, ...] = ()
+    history: tuple[Mapping[str, object], ...] = ()
+    path: Path | None = None
+    document: object = field(default=None, compare=False, repr=False)
+
+    @property
+    def library(self) -> Library:
+        """The built-in effects and this model's own."""
+        return library(self.user_effects)
+
+    def parameter(self, key: str) -> Parameter:
+        """The library's record of a parameter. Raises `ModelError` for an unknown key."""
+        try:
+            return self.library.parameter(key)
+        except EffectError as error:
+            raise ModelError(f"{self._label}: {error}") from None
+
+    def value(self, key: str) -> float:
+        """The value of a parameter [SI]."""
+        entry = self.entries.get(key)
+        return self.parameter(key).default if entry is None else entry.value
+
+    def entry(self, key: str) -> Entry:
+        """What the model says about a parameter, defaults filled in from the library."""
+        record = self.parameter(key)
+        entry = self.entries.get(key) or Entry(record.default, source=f"library default: {record.source}")
+        return replace(
+            entry,
+            free=record.free if entry.free is None else entry.free,
+            bounds=record.bounds if entry.bounds is None else entry.bounds,
+        )
+
+    def keys(self) -> tuple[str, ...]:
+        """Every parameter in use: base parameters of this kind of plant, and those of the effects that are on."""
+        mechanical = self.kind == "mechanical"
+        found = [p.name for p in base.PARAMETERS if not mechanical or p.name in base.MECHANICAL]
+        active = set(self.effects)
+        for effect in self.library.values():
+            if effect.name in active or effect.always_on:
+                found += [f"{effect.name}.{p.name}" for p in effect.parameters]
+        return tuple(found)
+
+    def free_keys(self) -> tuple[str, ...]:
+        """The parameters that a fit may move."""
+        return tuple(key for key in self.keys() if self.entry(key).free)
+
+    def with_values(self, values: Mapping[str, float], *, source: str | None = None) -> Model:
+        """A copy with other values [SI]. Raises `ModelError` for an unknown key or a value out of bounds."""
+        entries = dict(self.entries)
+        for key, value in values.items():
+            record = self.parameter(key)
+            try:
+                number = check_value(record, value, key)
+            except EffectError as error:
+                raise ModelError(f"{self._label}: {error}") from None
+            old = entries.get(key) or Entry(record.default, source=record.source)
+            entries[key] = replace(old, value=number, source=old.source if source is None else source)
+        return replace(self, entries=entries)
+
+    def with_entry(self, key: str, **changes: object) -> Model:
+        """A copy in which fields of one parameter's entry are changed (see `Entry`)."""
+        record = self.parameter(key)
+        old = self.entries.get(key) or Entry(record.default, source=record.source)
+        return replace(self, entries={**self.entries, key: replace(old, **changes)})  # type: ignore[arg-type]
+
+    def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> Model:
+        """A copy with an effect on, its parameters at the library's defaults unless given [SI]."""
+        effect = self._effect(name)
+        if effect.always_on:
+            raise ModelError(f"{self._label}: {name} is base physics and always on")
+        effects = self.effects if name in self.effects else (*self.effects, name)
+        changed = replace(self, effects=effects).with_values({f"{name}.{k}": v for k, v in (values or {}).items()})
+        changed.check_laws()
+        return changed
+
+    def without_effect(self, name: str) -> Model:
+        """A copy with an effect off; what it said of the effect's parameters is kept out too."""
+        if name not in self.effects:
+            raise ModelError(f"{self._label}: {name} is not on; on are: {', '.join(self.effects) or 'none'}")
+        entries = {k: v for k, v in self.entries.items() if not k.startswith(f"{name}.")}
+        return replace(self, effects=tuple(e for e in self.effects if e != name), entries=entries)
+
+    def with_history(self, **record: object) -> Model:
+        """A copy with one more line of provenance."""
+        return replace(self, history=(*self.history, record))
+
+    def check_laws(self) -> None:
+        """Raise `ModelError` when two laws claim the same slot, or an effect is named twice."""
+        taken: dict[str, str] = {}
+        for name in self.effects:
+            if self.effects.count(name) > 1:
+                raise ModelError(f"{self._label}: the effect {name} is named twice")
+            slot = self._effect(name).slot
+            if slots.SLOTS[slot].kind == "law":
+                if slot in taken:
+                    raise ModelError(
+                        f"{self._label}: {taken[slot]} and {name} are both laws of the slot {slot!r}; one at a time"
+                    )
+                taken[slot] = name
+
+    def check_complete(self) -> None:
+        """Raise `ModelError` when the model does not compose: laws that exclude each other, values missing."""
+        if self.kind not in KINDS:
+            raise ModelError(f"{self._label}: plant is {self.kind!r}; allowed: {', '.join(KINDS)}")
+        self.check_laws()
+        needed = [p.name for p in base.PARAMETERS if p.required]
+        if self.kind == "mechanical":
+            needed = ["moving_mass", "drive_force"]
+        missing = [name for name in needed if name not in self.entries]
+        if missing:
+            raise ModelError(f"{self._label}: no value for {', '.join(missing)} (required for a {self.kind} plant)")
+
+    def _effect(self, name: str):
+        try:
+            return self.library[name]
+        except EffectError as error:
+            raise ModelError(f"{self._label}: {error}") from None
+
+    @property
+    def _label(self) -> str:
+        return str(self.path) if self.path else f"model {self.name!r}"
+
+
+def check_bounds(key: str, record: Parameter, bounds: Iterable[float]) -> tuple[float, float]:
+    """Bounds that a model file narrows: in order and within the library's. Raises `ModelError`."""
+    low, high = (float(b) for b in bounds)
+    if not record.bounds[0] <= low < high <= record.bounds[1]:
+        raise ModelError(
+            f"{key}: bounds [{low:g}, {high:g}] are not in order within {record.bounds[0]:g} … {record.bounds[1]:g} "
+            f"{record.unit}"
+        )
+    return low, high

@@ -1,0 +1,259 @@
+"""Model files: YAML with units, sources and a history; read with the place of every error, saved with comments kept.
+
+    format: hydraulic-model-1
+    name: my_bench
+    plant: hydraulic                      # or mechanical
+    parameters:
+      piston_area_a: {value: 12.5 in^2, source: data sheet}
+      moving_mass: 500 kg                 # the short form
+    effects:
+      coulomb_friction: {level: {value: 450 N, fit: free, bounds: [0 N, 2000 N]}}
+      spool_dynamics: {}                  # on, with the library's defaults
+    user_effects: [my_effect.py]          # relative to this file
+    history: []
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+import os
+import tempfile
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError
+
+from .effect import Parameter, check_value
+from .errors import EffectError, ModelError
+from .model import KINDS, Entry, Model, check_bounds
+from .registry import library
+from .units import to_si
+
+__all__ = ["Entry", "Model", "ModelError", "load_model", "presets", "save_model"]
+
+FORMAT = "hydraulic-model-1"
+TOP_KEYS = ("format", "name", "description", "plant", "parameters", "effects", "user_effects", "history")
+ENTRY_KEYS = ("value", "source", "fit", "bounds", "standard_error", "printed", "note")
+
+
+def presets() -> dict[str, Path]:
+    """The models that ship with the package, by name."""
+    folder = Path(str(resources.files("hydraulic_sim") / "presets"))
+    return {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+
+
+def load_model(source: str | Path) -> Model:
+    """Read a model file, or a preset by its name.
+
+    Raises `ModelError` naming file, line, key, value and what is allowed.
+    """
+    path = Path(source)
+    if not path.is_file():
+        shipped = presets()
+        if str(source) not in shipped:
+            raise ModelError(f"{source}: no such model file; presets: {', '.join(shipped)}")
+        path = shipped[str(source)]
+    try:
+        document = _yaml().load(path.read_text(encoding="utf-8"))
+    except MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 0
+        raise ModelError(f"{path}:{line}: not valid YAML: {error.problem}") from None
+    except UnicodeDecodeError:
+        raise ModelError(f"{path}: not a text file in UTF-8") from None
+    return _Reader(path, document).model()
+
+
+def save_model(model: Model, path: str | Path, overwrite: bool = False) -> Path:
+    """Write a model; comments of the file it was read from are kept. Raises `ModelError` if ``path`` exists.
+
+    The file appears whole or not at all.
+    """
+    target = Path(path)
+    if target.exists() and not overwrite:
+        raise ModelError(f"{target} exists; give another name (nothing is overwritten silently)")
+    stream = io.StringIO()
+    _yaml().dump(_document(model, target), stream)
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(stream.getvalue())
+    os.chmod(temporary, 0o644)
+    os.replace(temporary, target)
+    return target
+
+
+def _yaml() -> YAML:
+    yaml = YAML()
+    yaml.width = 120
+    yaml.preserve_quotes = True
+    return yaml
+
+
+class _Reader:
+    """Turns a parsed document into a `Model`; every complaint names the line."""
+
+    def __init__(self, path: Path, document: object) -> None:
+        self.path = path
+        if not isinstance(document, CommentedMap):
+            raise ModelError(f"{path}: the file holds no mapping; expected the keys {', '.join(TOP_KEYS)}")
+        self.document = document
+
+    def fail(self, node: object, key: object, what: str) -> ModelError:
+        try:
+            line = f":{node.lc.key(key)[0] + 1}"  # type: ignore[attr-defined]
+        except Exception:
+            line = ""
+        return ModelError(f"{self.path}{line}: {what}")
+
+    def model(self) -> Model:
+        top = self.document
+        self._only(top, TOP_KEYS, "the model")
+        if top.get("format") != FORMAT:
+            raise self.fail(top, "format", f"format is {top.get('format')!r}; expected {FORMAT!r}")
+        kind = top.get("plant", "hydraulic")
+        if kind not in KINDS:
+            raise self.fail(top, "plant", f"plant is {kind!r}; allowed: {', '.join(KINDS)}")
+        try:
+            files = tuple((self.path.parent / str(f)).resolve() for f in top.get("user_effects") or ())
+            self.library = library(files)
+        except EffectError as error:
+            raise self.fail(top, "user_effects", str(error)) from None
+        entries: dict[str, Entry] = {}
+        self._section(self._mapping(top, "parameters"), "", entries)
+        effects = []
+        for name, values in self._mapping(top, "effects").items():
+            section = top["effects"]
+            if name not in self.library:
+                known = ", ".join(sorted(self.library))
+                raise self.fail(section, name, f"unknown effect {name!r}; the library has: {known}")
+            if values is not None and not isinstance(values, CommentedMap):
+                raise self.fail(section, name, f"effect {name}: expected a mapping of parameters, found {values!r}")
+            if not self.library[name].always_on:
+                effects.append(str(name))
+            self._section(values or CommentedMap(), f"{name}.", entries)
+        model = Model(
+            name=str(top.get("name") or self.path.stem),
+            description=str(top.get("description") or ""),
+            kind=kind,
+            entries=entries,
+            effects=tuple(effects),
+            user_effects=files,
+            history=tuple(dict(h) for h in top.get("history") or ()),
+            path=self.path,
+            document=top,
+        )
+        model.check_complete()
+        return model
+
+    def _mapping(self, node: CommentedMap, key: str) -> CommentedMap:
+        value = node.get(key)
+        if value is None:
+            return CommentedMap()
+        if not isinstance(value, CommentedMap):
+            raise self.fail(node, key, f"{key}: expected a mapping, found {value!r}")
+        return value
+
+    def _only(self, node: CommentedMap, allowed: tuple[str, ...], where: str) -> None:
+        for key in node:
+            if key not in allowed:
+                raise self.fail(node, key, f"{where} has no key {key!r}; allowed: {', '.join(allowed)}")
+
+    def _section(self, node: CommentedMap, prefix: str, entries: dict[str, Entry]) -> None:
+        for name, raw in node.items():
+            key = f"{prefix}{name}"
+            try:
+                record = self.library.parameter(key)
+                entries[key] = self._entry(key, record, raw)
+            except (EffectError, ModelError) as error:
+                raise self.fail(node, name, str(error)) from None
+
+    def _entry(self, key: str, record: Parameter, raw: object) -> Entry:
+        if not isinstance(raw, CommentedMap):
+            return Entry(check_value(record, to_si(raw, record.unit, key), key))  # type: ignore[arg-type]
+        for inner in raw:
+            if inner not in ENTRY_KEYS:
+                raise ModelError(f"{key} has no field {inner!r}; allowed: {', '.join(ENTRY_KEYS)}")
+        if "value" not in raw:
+            raise ModelError(f"{key}: no value")
+        fit = raw.get("fit")
+        if fit not in (None, "free", "fixed"):
+            raise ModelError(f"{key}: fit is {fit!r}; allowed: free, fixed")
+        bounds = raw.get("bounds")
+        if bounds is not None:
+            if not isinstance(bounds, CommentedSeq) or len(bounds) != 2:
+                raise ModelError(f"{key}: bounds are {bounds!r}; expected [lowest, highest]")
+            bounds = check_bounds(key, record, (to_si(b, record.unit, f"{key} bounds") for b in bounds))
+        error = raw.get("standard_error")
+        return Entry(
+            value=check_value(record, to_si(raw["value"], record.unit, key), key),
+            source=str(raw.get("source") or ""),
+            free=None if fit is None else fit == "free",
+            bounds=bounds,
+            standard_error=None if error is None else to_si(error, record.unit, f"{key} standard_error"),
+            printed=None if raw.get("printed") is None else str(raw["printed"]),
+            note=None if raw.get("note") is None else str(raw["note"]),
+        )
+
+
+def _document(model: Model, target: Path) -> CommentedMap:
+    """The YAML document of a model: the one it was read from, changed only where the model differs from it."""
+    top = copy.deepcopy(model.document) if isinstance(model.document, CommentedMap) else CommentedMap()
+    top["format"] = FORMAT
+    top["name"] = model.name
+    if model.description:
+        top["description"] = model.description
+    top["plant"] = model.kind
+    parameters = top.setdefault("parameters", CommentedMap())
+    effects = top.get("effects")
+    if not isinstance(effects, CommentedMap):
+        effects = top["effects"] = CommentedMap()
+    for name in [n for n in effects if n not in model.effects and not model.library[n].always_on]:
+        del effects[name]
+    for name in model.effects:
+        if effects.get(name) is None:
+            effects[name] = CommentedMap()
+    for key, entry in model.entries.items():
+        owner, _, name = key.rpartition(".")
+        node = effects.setdefault(owner, CommentedMap()) if owner else parameters
+        _write_entry(node, name, key, model.parameter(key), entry)
+    if model.user_effects:
+        top["user_effects"] = [os.path.relpath(f, target.resolve().parent) for f in model.user_effects]
+    top["history"] = [dict(h) for h in model.history]
+    return top
+
+
+def _write_entry(node: CommentedMap, name: str, key: str, record: Parameter, entry: Entry) -> None:
+    old = node.get(name)
+    fields: Mapping[str, object] = old if isinstance(old, CommentedMap) else {"value": old}
+    changed = old is None or to_si(fields["value"], record.unit, key) != entry.value  # type: ignore[arg-type]
+    extra: dict[str, object] = {
+        "source": entry.source or None,
+        "fit": None if entry.free is None else ("free" if entry.free else "fixed"),
+        "bounds": None if entry.bounds is None else [_quantity(b, record) for b in entry.bounds],
+        "standard_error": None if entry.standard_error is None else _quantity(entry.standard_error, record),
+        "printed": entry.printed,
+        "note": entry.note,
+    }
+    extra = {k: v for k, v in extra.items() if v is not None}
+    if not changed and not isinstance(old, CommentedMap) and not extra:
+        return
+    if not isinstance(old, CommentedMap):
+        kept = old
+        node[name] = old = CommentedMap()
+        old["value"] = kept
+    if changed:
+        old["value"] = _quantity(entry.value, record)
+    for field_name, value in extra.items():
+        if field_name == "bounds" and "bounds" in old:
+            now = [to_si(b, record.unit, key) for b in old["bounds"]]
+            if tuple(now) == entry.bounds:
+                continue
+        if old.get(field_name) != value:
+            old[field_name] = value
+
+
+def _quantity(value: float, record: Parameter) -> str:
+    return f"{value:.10g}" if record.unit == "1" else f"{value:.10g} {record.unit}"
