@@ -1,0 +1,1 @@
+"""Plans that come with the package; load them by name with `load_plan`."""

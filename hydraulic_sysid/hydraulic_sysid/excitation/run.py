@@ -1,0 +1,135 @@
+"""One run of a plan: from each measured position the next drive, and the reasons to stop."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+
+from hydraulic_sysid.excitation.applied import AppliedDriveCheck
+from hydraulic_sysid.excitation.plan import Plan
+
+STOP_RAMP_S = 0.1
+HOLD_S = 0.1
+
+
+class Phase(Enum):
+    """Where a run is."""
+
+    PLAYING = "playing"
+    STOPPING = "stopping"  # was asked to stop: the drive falls to zero
+    ABORTED = "aborted"  # 0 V is held for HOLD_S
+    FINISHED = "finished"
+
+
+class ExcitationRun:
+    """Plays a plan sample by sample: u = w·(signal + offset + centring), within ± the plan's amplitude limit.
+
+    Centring is −k_c·(x − x_c), clamped to the plan's `centring_limit`: a servo valve plant integrates, and
+    without it the piston drifts to a stop. It is meant to be weak: k_c times the velocity gain is far below
+    the lowest frequency of interest. What it adds is part of the applied drive, and so of the record.
+
+    The drive comes from the time of the state, not from a count of calls: a lost state shortens nothing. The
+    run aborts — 0 V at once — on a position that is no number, beyond the travel limit or too old, and on a
+    drive that the plant does not apply. It never moves again after that.
+    """
+
+    def __init__(
+        self, plan: Plan, *, state_timeout: float = 0.05, applied_check: AppliedDriveCheck | None = None
+    ) -> None:
+        self.plan = plan
+        self.phase = Phase.PLAYING
+        self.reason = ""
+        self.drive = 0.0
+        self.played = 0
+        self._state_timeout = state_timeout
+        self._applied_check = applied_check
+        # Lists of floats: indexing an array costs ten times more.
+        self._open_loop: list[float] = plan.open_loop.tolist()
+        self._envelope: list[float] = plan.envelope.tolist()
+        self._start: float | None = None
+        self._time = -math.inf
+        self._index = -1
+        self._end = math.inf
+        self._stop_drive = 0.0
+
+    @property
+    def done(self) -> bool:
+        """Nothing is left to command."""
+        return self.phase is Phase.FINISHED or (self.phase is Phase.ABORTED and self._time >= self._end)
+
+    @property
+    def progress(self) -> float:
+        """The played part of the plan, 0 … 1."""
+        return min(1.0, (self._index + 1) / len(self._open_loop))
+
+    def step(self, t: float, position: float, applied: float | None = None) -> float:
+        """The drive [V] that answers the state sampled at `t` [s] with the piston at `position` [m].
+
+        `applied` is the drive [V] that the plant reports in that state. The first call starts the run.
+        """
+        if self._start is None:
+            self._start = self._time = t
+        if self.phase in (Phase.PLAYING, Phase.STOPPING):
+            self._guard(t, position, applied)
+        self._time = max(self._time, t)  # in this order a NaN changes nothing
+        if self.phase is Phase.PLAYING:
+            self._play(t, position)
+        elif self.phase is Phase.STOPPING:
+            self._fall()
+        if self._applied_check is not None:
+            self._applied_check.commanded(self.drive)
+        return self.drive
+
+    def abort(self, reason: str) -> None:
+        """End the run at once: 0 V, held for HOLD_S. A run that is over stays as it is."""
+        if self.phase in (Phase.PLAYING, Phase.STOPPING):
+            self.phase, self.drive = Phase.ABORTED, 0.0
+            self.reason = self.reason or reason  # what was asked first is the cause
+            self._end = self._time + HOLD_S
+
+    def stop(self, reason: str) -> None:
+        """End the run on request: the drive falls to zero within STOP_RAMP_S, then the run is aborted."""
+        if self.phase is Phase.PLAYING:
+            self.phase, self.reason = Phase.STOPPING, reason
+            self._stop_drive, self._end = self.drive, self._time + STOP_RAMP_S
+
+    def check_age(self, age: float) -> None:
+        """Abort when `age` [s] of the last state is beyond what is allowed; to be called while none comes."""
+        if age > self._state_timeout:
+            self.abort(f"no state for {age:.3f} s (allowed: {self._state_timeout:g} s)")
+
+    def _guard(self, t: float, position: float, applied: float | None) -> None:
+        plan = self.plan
+        if not math.isfinite(t) or t < self._time:
+            self.abort(f"the time of the state went from {self._time:.6f} s to {t:.6f} s")
+        self.check_age(t - self._time)
+        if not math.isfinite(position):
+            self.abort(f"the position is {position}")
+        elif abs(position - plan.centre) > plan.travel_limit:
+            limits = f"{plan.centre - plan.travel_limit:.4f} … {plan.centre + plan.travel_limit:.4f} m"
+            self.abort(f"the piston is at {position:.4f} m (allowed: {limits})")
+        if applied is not None and self._applied_check is not None:
+            fault = self._applied_check.fault(t, applied)
+            if fault:
+                self.abort(fault)
+
+    def _play(self, t: float, position: float) -> None:
+        assert self._start is not None
+        plan = self.plan
+        index = round((t - self._start) * plan.rate)
+        if index >= len(self._open_loop):
+            self.phase, self.drive = Phase.FINISHED, 0.0
+            return
+        self.played += index > self._index
+        self._index = index
+        pull = -plan.centring_gain * (position - plan.centre)
+        pull = min(max(pull, -plan.centring_limit), plan.centring_limit)
+        drive = self._open_loop[index] + self._envelope[index] * pull
+        self.drive = min(max(drive, -plan.amplitude_limit), plan.amplitude_limit)
+
+    def _fall(self) -> None:
+        left = (self._end - self._time) / STOP_RAMP_S
+        if left <= 0.0:
+            self.abort(self.reason)
+        else:
+            self.drive = self._stop_drive * min(left, 1.0)

@@ -1,0 +1,33 @@
+"""Triangle wave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydraulic_sysid.excitation.settings import number
+from hydraulic_sysid.excitation.signals._base import Array, Signal, amplitude
+
+
+@dataclass(frozen=True)
+class Triangle(Signal):
+    """A triangle from 0 up to +A, down to −A and back: the same time at every drive, slowly through null.
+
+    It shows what sits around null: deadband, stiction, underlap, bias.
+    """
+
+    label = "triangle"
+
+    amplitude: float = amplitude("peak of the triangle")
+    frequency: float = number("Hz", "how often it repeats", above=0.0, maximum=1000.0)
+
+    @property
+    def highest_frequency(self) -> float:
+        return self.frequency
+
+    def sample(self, t: Array) -> Array:
+        turn = np.mod(
+            np.asarray(t) * self.frequency + 0.25, 1.0
+        )  # a quarter on, so that it starts at zero, rising
+        return self.amplitude * (1.0 - 4.0 * np.abs(turn - 0.5))
