@@ -1,16 +1,8 @@
-"""Build of the ROS 2 package hydraulic_interfaces: every module in nodes/ and verbs/ is an executable."""
-
-from pathlib import Path
+"""Build of the ROS 2 package hydraulic_interfaces: a library; its nodes/ holds base classes, no executables."""
 
 from setuptools import find_packages, setup
 
 NAME = "hydraulic_interfaces"
-
-
-def executables() -> list[str]:
-    """One console script per public module of nodes/ and verbs/, named after the file."""
-    files = [p for part in ("nodes", "verbs") for p in sorted(Path(NAME, part).glob("[!_]*.py"))]
-    return [f"{p.stem} = {'.'.join(p.with_suffix('').parts)}:main" for p in files]
 
 
 setup(
@@ -26,5 +18,4 @@ setup(
     maintainer="Hydraulic Bench Maintainers",
     maintainer_email="maintainers@hydraulic-bench.example.org",
     license="Apache-2.0",
-    entry_points={"console_scripts": executables()},
 )

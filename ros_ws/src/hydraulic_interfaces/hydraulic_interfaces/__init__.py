@@ -1,0 +1,1 @@
+"""Ground floor of the bench: the topic contract and the node base that serves it."""

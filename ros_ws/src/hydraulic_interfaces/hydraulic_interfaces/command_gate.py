@@ -1,0 +1,155 @@
+"""The gate every command passes on its way to an actuator: limits, watchdog, one source at a time, emergency
+stop.
+
+Rules, the same for a simulated and a real actuator:
+
+- A command must be finite, name its source, and be no older than the watchdog time (nor as far in the future:
+  its sender uses another clock). Anything else is rejected and counted. Out of range is clamped and counted.
+- The first source heard is obeyed; another one is refused until the first has been silent for the watchdog
+  time.
+- Without a valid command for the watchdog time the drive is 0 V; the next valid command re-arms it.
+- A stop (emergency or fault) is latched until `reset`. Reset leaves the gate disabled: moving again takes
+  `enable`.
+- While disabled or stopped the drive is 0 V and commands are refused, so that none waits for the enable.
+
+The gate knows no threads: `accept` and `drive` belong to one thread, the switches may be thrown from another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from enum import Enum
+
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V, WATCHDOG_S
+from hydraulic_interfaces.samples import Command
+
+
+class Verdict(Enum):
+    """What became of a command."""
+
+    ACCEPTED = "accepted"
+    CLAMPED = "clamped to the limits"
+    MALFORMED = "rejected: not a command for the servo valve"
+    NOT_FINITE = "rejected: drive is not finite"
+    UNNAMED = "rejected: frame_id names no source"
+    STALE = "rejected: older than the watchdog time"
+    FUTURE = "rejected: stamped in the future, the sender uses another clock"
+    OTHER_SOURCE = "refused: another source is in command"
+    DISABLED = "refused: not enabled"
+    STOPPED = "refused: stopped until reset"
+
+    @property
+    def obeyed(self) -> bool:
+        """Whether the command moves the actuator."""
+        return self in (Verdict.ACCEPTED, Verdict.CLAMPED)
+
+
+class CommandGate:
+    """Decides which commands count and what drive [V] applies; `limit` in V, `watchdog` in s."""
+
+    def __init__(self, limit: float = DRIVE_LIMIT_V, watchdog: float = WATCHDOG_S) -> None:
+        if not (math.isfinite(limit) and limit > 0.0):
+            raise ValueError(f"drive limit is {limit} V, must be positive and finite")
+        self.limit = limit
+        self.watchdog = watchdog
+        self.counts: Counter[Verdict] = Counter()
+        self.timeouts = 0
+        self.enabled = False
+        self.stop_reason = ""
+        self.last_problem = ""
+        self._source = ""
+        self._drive = 0.0
+        self._heard_ns: int | None = None
+
+    @property
+    def watchdog(self) -> float:
+        """Longest silence of the source in command, s."""
+        return self._watchdog_ns * 1e-9
+
+    @watchdog.setter
+    def watchdog(self, seconds: float) -> None:
+        if not (math.isfinite(seconds) and seconds > 0.0):
+            raise ValueError(f"watchdog is {seconds} s, must be positive and finite")
+        self._watchdog_ns = round(seconds * 1e9)
+
+    @property
+    def source(self) -> str:
+        """Name of the source in command; empty when there is none."""
+        return self._source
+
+    @property
+    def stopped(self) -> bool:
+        """Whether a stop is latched."""
+        return bool(self.stop_reason)
+
+    def enable(self, on: bool) -> bool:
+        """Let commands through, or not; False when a latched stop forbids it."""
+        self.enabled = on and not self.stopped
+        return self.enabled == on
+
+    def stop(self, reason: str) -> None:
+        """Latch 0 V until `reset`; the first reason is kept."""
+        self.stop_reason = self.stop_reason or reason or "stopped"
+        self.enabled = False
+
+    def reset(self) -> None:
+        """Release the latched stop, if there is one; the gate then stays disabled until `enable`."""
+        self.stop_reason = ""
+
+    def age(self, now_ns: int) -> float:
+        """Seconds since the last obeyed command arrived; NaN when no source is in command."""
+        return math.nan if self._heard_ns is None else (now_ns - self._heard_ns) * 1e-9
+
+    def accept(self, command: Command, now_ns: int) -> Verdict:
+        """Judge a command that arrived at `now_ns`, and hold its drive if it is obeyed."""
+        verdict = self._judge(command, now_ns)
+        self.counts[verdict] += 1
+        if verdict.obeyed:
+            self._source = command.source
+            self._drive = min(max(command.drive, -self.limit), self.limit)
+            self._heard_ns = now_ns
+        if verdict is not Verdict.ACCEPTED:
+            self.last_problem = f"{verdict.value} (source {command.source!r}, {command.drive} V)"
+        return verdict
+
+    def reject(self, reason: str) -> Verdict:
+        """Count a message that could not be read as a command; `reason` says why."""
+        self.counts[Verdict.MALFORMED] += 1
+        self.last_problem = f"{Verdict.MALFORMED.value}: {reason}"
+        return Verdict.MALFORMED
+
+    def drive(self, now_ns: int) -> float:
+        """The drive to apply now, V: always finite and within the limits."""
+        if self._heard_ns is not None and not self._in_command(now_ns):
+            # Only a silence that takes a drive away from an enabled actuator is a fault of the source.
+            self.timeouts += self.enabled
+            self._release()
+        if self.stop_reason or not self.enabled:
+            self._release()
+        return self._drive
+
+    def _judge(self, command: Command, now_ns: int) -> Verdict:
+        age_ns = now_ns - command.stamp_ns
+        if not command.source:
+            return Verdict.UNNAMED
+        if not math.isfinite(command.drive):
+            return Verdict.NOT_FINITE
+        if age_ns > self._watchdog_ns:
+            return Verdict.STALE
+        if age_ns < -self._watchdog_ns:
+            return Verdict.FUTURE
+        if self.stop_reason:
+            return Verdict.STOPPED
+        if not self.enabled:
+            return Verdict.DISABLED
+        if self._in_command(now_ns) and command.source != self._source:
+            return Verdict.OTHER_SOURCE
+        return Verdict.ACCEPTED if abs(command.drive) <= self.limit else Verdict.CLAMPED
+
+    def _in_command(self, now_ns: int) -> bool:
+        # A clock that jumped back must not keep an old command alive.
+        return self._heard_ns is not None and 0 <= now_ns - self._heard_ns <= self._watchdog_ns
+
+    def _release(self) -> None:
+        self._source, self._drive, self._heard_ns = "", 0.0, None

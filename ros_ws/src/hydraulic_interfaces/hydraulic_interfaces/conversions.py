@@ -1,0 +1,222 @@
+"""Between the contract's messages and plain samples, exactly and both ways.
+
+Publishing at 1 kHz goes through the encoders: they write the changing numbers into a message that was
+serialised once, which costs a tenth of building and serialising it anew.
+"""
+
+from __future__ import annotations
+
+import struct
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import Header
+
+from hydraulic_interfaces.contract import PISTON, PLANT_FRAME, SERVOVALVE
+from hydraulic_interfaces.samples import NAN, Command, PlantSample, Reference
+
+_SECOND = 1_000_000_000
+
+
+class MessageError(ValueError):
+    """A message that does not carry what the contract says: the text names the field and what it holds."""
+
+
+@cache
+def interface_class(name: str) -> Any:
+    """Class of a message or service type by its name, "sensor_msgs/msg/JointState"."""
+    package, kind, short = name.split("/")
+    return getattr(import_module(f"{package}.{kind}"), short)
+
+
+def to_time(stamp_ns: int) -> Time:
+    """Message stamp of nanoseconds since the epoch."""
+    seconds, nanoseconds = divmod(stamp_ns, _SECOND)
+    return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def from_time(stamp: Time) -> int:
+    """Nanoseconds since the epoch of a message stamp."""
+    return stamp.sec * _SECOND + stamp.nanosec
+
+
+def command_to_message(command: Command) -> JointState:
+    """Message of a command."""
+    header = Header(stamp=to_time(command.stamp_ns), frame_id=command.source)
+    return JointState(header=header, name=[SERVOVALVE], effort=[float(command.drive)])
+
+
+def command_from_message(message: JointState) -> Command:
+    """Command in a message; position and velocity are not looked at.
+
+    :raises MessageError: other names than [servovalve], or not exactly one effort.
+    """
+    if message.name != [SERVOVALVE]:
+        raise MessageError(f"command: name is {list(message.name)}, must be [{SERVOVALVE!r}]")
+    if len(message.effort) != 1:
+        raise MessageError(f"command: effort has {len(message.effort)} values, must have 1 (the drive in V)")
+    return Command(from_time(message.header.stamp), message.header.frame_id, message.effort[0])
+
+
+def state_to_message(sample: PlantSample) -> JointState:
+    """The `state` message of a sample."""
+    return JointState(
+        header=Header(stamp=to_time(sample.stamp_ns), frame_id=PLANT_FRAME),
+        name=[PISTON, SERVOVALVE],
+        position=[sample.position, sample.spool],
+        velocity=[sample.velocity, NAN],
+        effort=[sample.force, sample.drive],
+    )
+
+
+def pressure_to_message(stamp_ns: int, pressure: float) -> FluidPressure:
+    """The message of one pressure [Pa]."""
+    return FluidPressure(
+        header=Header(stamp=to_time(stamp_ns), frame_id=PLANT_FRAME), fluid_pressure=pressure
+    )
+
+
+def sample_to_messages(sample: PlantSample) -> tuple[JointState, FluidPressure, FluidPressure, FluidPressure]:
+    """Messages of `state`, `pressure_a`, `pressure_b`, `pressure_supply` of a sample."""
+    pressures = (sample.pressure_a, sample.pressure_b, sample.pressure_supply)
+    a, b, supply = (pressure_to_message(sample.stamp_ns, value) for value in pressures)
+    return state_to_message(sample), a, b, supply
+
+
+def sample_from_messages(
+    state: JointState,
+    pressure_a: FluidPressure | None = None,
+    pressure_b: FluidPressure | None = None,
+    pressure_supply: FluidPressure | None = None,
+    limit_retracted: bool = False,
+    limit_extended: bool = False,
+) -> PlantSample:
+    """Sample in messages of one instant; a pressure that is not given is NaN.
+
+    :raises MessageError: names other than [piston, servovalve], lists of other lengths, or unequal stamps.
+    """
+    if state.name != [PISTON, SERVOVALVE]:
+        raise MessageError(f"state: name is {list(state.name)}, must be [{PISTON!r}, {SERVOVALVE!r}]")
+    for field in ("position", "velocity", "effort"):
+        if len(getattr(state, field)) != 2:
+            raise MessageError(f"state: {field} has {len(getattr(state, field))} values, must have 2")
+    stamp = from_time(state.header.stamp)
+    pressures = {"pressure_a": pressure_a, "pressure_b": pressure_b, "pressure_supply": pressure_supply}
+    for name, message in pressures.items():
+        if message is not None and from_time(message.header.stamp) != stamp:
+            other = from_time(message.header.stamp)
+            raise MessageError(f"{name}: stamp {other} ns is not the state's {stamp} ns")
+    return PlantSample(
+        stamp_ns=stamp,
+        position=state.position[0],
+        velocity=state.velocity[0],
+        force=state.effort[0],
+        drive=state.effort[1],
+        spool=state.position[1],
+        limit_retracted=limit_retracted,
+        limit_extended=limit_extended,
+        **{name: NAN if m is None else m.fluid_pressure for name, m in pressures.items()},
+    )
+
+
+def reference_to_message(reference: Reference) -> JointState:
+    """Message of a reference."""
+    return JointState(
+        header=Header(stamp=to_time(reference.stamp_ns), frame_id=PLANT_FRAME),
+        name=[PISTON],
+        position=[float(reference.position)],
+        velocity=[float(reference.velocity)],
+    )
+
+
+def reference_from_message(message: JointState) -> Reference:
+    """Reference in a message; velocity is NaN where the message has none.
+
+    :raises MessageError: names other than [piston], or not exactly one position.
+    """
+    if message.name != [PISTON]:
+        raise MessageError(f"reference: name is {list(message.name)}, must be [{PISTON!r}]")
+    if len(message.position) != 1 or len(message.velocity) > 1:
+        sizes = f"{len(message.position)} positions and {len(message.velocity)} velocities"
+        raise MessageError(f"reference: has {sizes}, must have 1 and at most 1")
+    velocity = message.velocity[0] if len(message.velocity) else NAN
+    return Reference(from_time(message.header.stamp), message.position[0], velocity)
+
+
+class _Template:
+    """A serialised message in which the stamp and some numbers are overwritten in place."""
+
+    # The stamp follows the 4 bytes of the encapsulation header in every stamped message.
+    _STAMP_AT = 4
+
+    def __init__(self, message: Any, *fields: tuple[float, ...]) -> None:
+        """`fields`: values that stand side by side in `message` and mark where numbers go later."""
+        self._buffer = bytearray(serialize_message(message))
+        order = "<" if self._buffer[1] else ">"
+        self._stamp = struct.Struct(f"{order}iI")
+        self._fields = []
+        for values in fields:
+            form = struct.Struct(f"{order}{len(values)}d")
+            marker = form.pack(*values)
+            if self._buffer.count(marker) != 1:
+                raise ValueError(f"marker {values} is not unique in the serialised {type(message).__name__}")
+            self._fields.append((form, self._buffer.index(marker)))
+
+    def fill(self, stamp_ns: int, *fields: tuple[float, ...]) -> bytes:
+        """The message with this stamp and these numbers."""
+        buffer = self._buffer
+        self._stamp.pack_into(buffer, self._STAMP_AT, *divmod(stamp_ns, _SECOND))
+        for (form, offset), values in zip(self._fields, fields, strict=True):
+            form.pack_into(buffer, offset, *values)
+        return bytes(buffer)
+
+
+class StateEncoder:
+    """Serialised `state` messages, equal in content to those of `state_to_message`."""
+
+    def __init__(self) -> None:
+        marked = PlantSample(0, position=1.25, velocity=2.25, force=3.25, drive=4.25, spool=5.25)
+        self._template = _Template(state_to_message(marked), (1.25, 5.25), (2.25,), (3.25, 4.25))
+
+    def __call__(self, sample: PlantSample) -> bytes:
+        """CDR bytes for `Publisher.publish`."""
+        position, effort = (sample.position, sample.spool), (sample.force, sample.drive)
+        return self._template.fill(sample.stamp_ns, position, (sample.velocity,), effort)
+
+
+class CommandEncoder:
+    """Serialised `command` messages of one source, equal in content to those of `command_to_message`."""
+
+    def __init__(self, source: str) -> None:
+        self._template = _Template(command_to_message(Command(0, source, 1.25)), (1.25,))
+
+    def __call__(self, stamp_ns: int, drive: float) -> bytes:
+        """CDR bytes for `Publisher.publish`."""
+        return self._template.fill(stamp_ns, (drive,))
+
+
+class PressureEncoder:
+    """Serialised pressure messages, equal in content to those of `pressure_to_message`."""
+
+    def __init__(self) -> None:
+        self._template = _Template(pressure_to_message(0, 1.25), (1.25,))
+
+    def __call__(self, stamp_ns: int, pressure: float) -> bytes:
+        """CDR bytes for `Publisher.publish`."""
+        return self._template.fill(stamp_ns, (pressure,))
+
+
+class ClockEncoder:
+    """Serialised `/clock` messages."""
+
+    def __init__(self) -> None:
+        self._template = _Template(Clock())
+
+    def __call__(self, stamp_ns: int) -> bytes:
+        """CDR bytes for `Publisher.publish`."""
+        return self._template.fill(stamp_ns)

@@ -1,0 +1,123 @@
+"""The plant's rows on `/diagnostics`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from hydraulic_interfaces.command_gate import CommandGate, Verdict
+from hydraulic_interfaces.conversions import to_time
+from hydraulic_interfaces.plant_backend import PlantBackend
+from hydraulic_interfaces.plant_loop import PlantLoop
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+# A wall clock set by more than this makes commands look stale and records inconsistent.
+_CLOCK_STEP_S = 0.01
+
+
+class PlantHealth:
+    """Builds the diagnostics; a counter that moved since the last message raises the level once."""
+
+    def __init__(self, name: str, gate: CommandGate, backend: PlantBackend) -> None:
+        self._name, self._gate, self._backend = name, gate, backend
+        self._seen: dict[str, int] = {}
+
+    def urgent(self) -> tuple[object, ...]:
+        """Changes of this value are worth a message at once."""
+        gate = self._gate
+        refused = sum(count for verdict, count in gate.counts.items() if verdict is not Verdict.ACCEPTED)
+        return gate.enabled, gate.stop_reason, gate.timeouts, gate.source, bool(refused)
+
+    def message(self, state: str, loop: PlantLoop | None, error: str, now_ns: int) -> DiagnosticArray:
+        """The diagnostics now; `state` is the lifecycle state, `error` what made the node leave `active`."""
+        array = DiagnosticArray(status=[self._plant(state, error), self._command(state, loop, now_ns)])
+        array.header.stamp = to_time(now_ns)
+        if loop is not None:
+            array.status.append(self._timing(loop))
+        return array
+
+    def _plant(self, state: str, error: str) -> DiagnosticStatus:
+        gate = self._gate
+        values = {
+            "lifecycle": state,
+            "enabled": gate.enabled,
+            "emergency_stop": gate.stopped,
+            "stop_reason": gate.stop_reason,
+            "fault": error or self._backend.fault,
+            **self._backend.report(),
+        }
+        if error or self._backend.fault:
+            return self._status("plant", ERROR, error or self._backend.fault, values)
+        if gate.stopped:
+            return self._status("plant", ERROR, f"stopped until reset: {gate.stop_reason}", values)
+        enabled = "enabled" if gate.enabled else "not enabled"
+        return self._status("plant", OK, f"{state}, {enabled}", values)
+
+    def _command(self, state: str, loop: PlantLoop | None, now_ns: int) -> DiagnosticStatus:
+        gate = self._gate
+        counts = {verdict.name.lower(): gate.counts[verdict] for verdict in Verdict}
+        values = {
+            "source": gate.source,
+            "age_s": f"{gate.age(now_ns):.4f}",
+            "applied_drive_V": f"{loop.drive if loop else 0.0:.4f}",
+            "watchdog_s": f"{gate.watchdog:g}",
+            "timeouts": gate.timeouts,
+            "last_problem": gate.last_problem,
+            **counts,
+        }
+        timeouts = self._moved("timeouts", gate.timeouts)
+        problems = self._moved("problems", sum(counts.values()) - gate.counts[Verdict.ACCEPTED])
+        if timeouts:
+            message = f"watchdog: no command for {gate.watchdog:g} s, drive is 0 V"
+            return self._status("command", WARN, message, values)
+        if problems:
+            return self._status("command", WARN, f"{problems} commands {gate.last_problem}", values)
+        if state == "active" and gate.enabled and not gate.source:
+            return self._status("command", WARN, "no command: drive is 0 V", values)
+        return self._status("command", OK, f"obeys {gate.source!r}" if gate.source else "no source", values)
+
+    def _timing(self, loop: PlantLoop) -> DiagnosticStatus:
+        report = loop.monitor.report()
+        step = loop.wall_clock_step()
+        values = {
+            "rate_Hz": f"{report.rate:.2f}",
+            "jitter_p50_ms": f"{report.jitter_p50 * 1e3:.4f}",
+            "jitter_p99_ms": f"{report.jitter_p99 * 1e3:.4f}",
+            "jitter_max_ms": f"{report.jitter_max * 1e3:.4f}",
+            "run_jitter_p50_ms": f"{report.run_jitter_p50 * 1e3:.4f}",
+            "run_jitter_p99_ms": f"{report.run_jitter_p99 * 1e3:.4f}",
+            "run_jitter_max_ms": f"{report.run_jitter_max * 1e3:.4f}",
+            "lateness_max_ms": f"{report.lateness_max * 1e3:.4f}",
+            "samples": loop.samples,
+            "overruns": report.overruns,
+            "skipped": report.skipped,
+            "wall_clock_step_s": f"{step:.4f}",
+            "scheduling": loop.scheduling,
+        }
+        skipped = self._moved("skipped", report.skipped)
+        overruns = self._moved("overruns", report.overruns)
+        if skipped:
+            return self._status("timing", ERROR, f"{skipped} sampling instants skipped", values)
+        if abs(step) > _CLOCK_STEP_S:
+            message = f"wall clock was set by {step:.3f} s: re-activate to stamp with the new time"
+            return self._status("timing", WARN, message, values)
+        if overruns:
+            return self._status("timing", WARN, f"{overruns} deadlines overrun", values)
+        return self._status("timing", OK, f"{report.rate:.1f} Hz", values)
+
+    def _moved(self, counter: str, value: int) -> int:
+        before = self._seen.get(counter, 0)
+        self._seen[counter] = value
+        # A counter that starts anew with a new run of the loop has not moved by a negative number.
+        return value - before if value >= before else value
+
+    def _status(self, part: str, level: bytes, message: str, values: Mapping[str, Any]) -> DiagnosticStatus:
+        return DiagnosticStatus(
+            level=level,
+            name=f"{self._name}: {part}",
+            message=message,
+            hardware_id=self._backend.hardware_id,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )

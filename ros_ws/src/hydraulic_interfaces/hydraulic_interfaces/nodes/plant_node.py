@@ -1,0 +1,240 @@
+"""The managed node that serves the whole contract over a `PlantBackend`: simulated and real plants alike.
+
+States: `configure` loads the plant, `activate` starts the loop at 0 V and *not enabled* (parameter
+`enable_on_activate` changes that), the service `enable` lets commands through. `emergency_stop` works in
+every state and survives all transitions until `reset`. A backend that fails leaves the node unconfigured, at
+0 V.
+"""
+
+from __future__ import annotations
+
+import gc
+from typing import Any
+
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from std_srvs.srv import SetBool, Trigger
+
+from hydraulic_interfaces.command_gate import CommandGate
+from hydraulic_interfaces.contract import NAMESPACE, PLANT_NODE, RATE_HZ, WATCHDOG_S
+from hydraulic_interfaces.conversions import interface_class
+from hydraulic_interfaces.nodes.guarded_lifecycle import guard_transitions
+from hydraulic_interfaces.nodes.parameters import ParameterTable
+from hydraulic_interfaces.nodes.plant_health import PlantHealth
+from hydraulic_interfaces.nodes.plant_ports import PlantPorts
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_interfaces.plant_backend import PlantBackend
+from hydraulic_interfaces.plant_loop import LoopTiming, PlantLoop
+from hydraulic_interfaces.qos import profile
+
+SUCCESS, FAILURE, ERROR = (
+    TransitionCallbackReturn.SUCCESS,
+    TransitionCallbackReturn.FAILURE,
+    TransitionCallbackReturn.ERROR,
+)
+_WATCH_PERIOD_S = 0.1
+_REPORT_EVERY = 5
+
+PARAMETERS: tuple[ParameterSpec, ...] = (
+    ParameterSpec("rate", RATE_HZ, "sampling rate of the plant", "Hz", 1.0, 5000.0),
+    ParameterSpec("watchdog", WATCHDOG_S, "silence of the source until 0 V", "s", 0.002, 10.0, live=True),
+    ParameterSpec("enable_on_activate", False, "obey commands from activation on, without `enable`"),
+    ParameterSpec("autostart", False, "configure and activate at start"),
+    ParameterSpec("realtime_priority", 20, "FIFO priority of the loop where permitted, 0: none", "", 0, 98),
+)
+
+
+class PlantNode(LifecycleNode):
+    """Topics, services, lifecycle and diagnostics of `backend` as the contract says."""
+
+    def __init__(self, backend: PlantBackend, **kwargs: Any) -> None:
+        super().__init__(PLANT_NODE, namespace=NAMESPACE, **kwargs)
+        guard_transitions(self)
+        self._backend = backend
+        self._state = "unconfigured"
+        self._error = ""
+        self._loop: PlantLoop | None = None
+        self._last_stamp_ns = 0
+        self._late_parameters: list[str] = []
+        self.gate = CommandGate()
+        self._table = ParameterTable(
+            self, (*PARAMETERS, *backend.parameters()), self._apply, lambda: self._state != "unconfigured"
+        )
+        self.gate.watchdog = self._table["watchdog"]
+        self._ports = PlantPorts(self)
+        self._health = PlantHealth(self.get_fully_qualified_name(), self.gate, backend)
+        self._diagnostics = self.create_publisher(
+            interface_class("diagnostic_msgs/msg/DiagnosticArray"), "/diagnostics", profile("diagnostics")
+        )
+        self.create_service(SetBool, "enable", self._on_enable)
+        self.create_service(Trigger, "emergency_stop", self._on_emergency_stop)
+        self.create_service(Trigger, "reset", self._on_reset)
+        self._watched: tuple[object, ...] = ()
+        self._watch_count = 0
+        self.create_timer(_WATCH_PERIOD_S, self._watch)
+        if self._table["autostart"]:
+            self._starter = self.create_timer(0.0, self._autostart)
+
+    @property
+    def state(self) -> str:
+        """Lifecycle state by its name."""
+        return self._state
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Read the parameters and load the plant; FAILURE with a log line if that cannot be done."""
+        self._error = ""
+        try:
+            values = self._table.values()
+            self._timing = LoopTiming(
+                period_ns=round(1e9 / values["rate"]),
+                factor=values.get("real_time_factor", 1.0),
+                own_clock=values.get("publish_clock", False),
+                priority=values["realtime_priority"],
+            )
+            late = self._backend.configure(values)
+            self._late_parameters = [spec.name for spec in late]
+            self._table.declare(late)
+            for spec in late:
+                if self._table[spec.name] != spec.default:
+                    self._backend.set_parameter(spec.name, self._table[spec.name])
+        except Exception as error:
+            self._release(f"cannot configure: {error}")
+            return FAILURE
+        if self._timing.own_clock:
+            self._ports.open_clock()
+        self._state = "inactive"
+        return SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start the plant loop at 0 V."""
+        self._ports.discard_commands()
+        try:
+            self._backend.activate()
+            self._switch(self._table["enable_on_activate"])
+        except Exception as error:
+            self._complain(f"cannot activate: {error}")
+            self._backend.deactivate()
+            return FAILURE
+        self._loop = PlantLoop(self._backend, self.gate, self._ports, self._timing, self._last_stamp_ns)
+        self._loop.start()
+        self._state = "active"
+        return SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """0 V, then stop the loop; ERROR if it had failed."""
+        return SUCCESS if self._halt() else ERROR
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Release the plant."""
+        self._release("")
+        return SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """From whatever state: 0 V, loop stopped, plant released."""
+        self._halt()
+        if self._state == "inactive":
+            self._release("")
+        self._state = "finalized"
+        return SUCCESS
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Release the plant; the node can be configured again."""
+        self._halt()
+        self._release("")
+        return SUCCESS
+
+    def _halt(self) -> bool:
+        """End the loop at 0 V; False if it had failed or hangs."""
+        loop, self._loop = self._loop, None
+        if loop is None:
+            return True
+        try:
+            self._switch(False)
+        except Exception as error:
+            self._complain(f"disabling failed: {error}")
+        if not loop.stop():
+            self._complain("the plant loop hangs in its backend")
+            return False
+        self._last_stamp_ns = loop.last_stamp_ns
+        self._state = "inactive"
+        return loop.error is None
+
+    def _release(self, problem: str) -> None:
+        if problem:
+            self._complain(problem)
+        self._table.undeclare(name for name in self._late_parameters if self.has_parameter(name))
+        self._late_parameters = []
+        try:
+            self._backend.cleanup()
+        except Exception as error:
+            self._complain(f"cleanup failed: {error}")
+        self._state = "unconfigured"
+
+    def _switch(self, on: bool) -> None:
+        self._backend.set_enabled(self.gate.enable(on) and on)
+
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        if request.data and self._state != "active":
+            response.message = f"the plant is {self._state}, not active"
+            return response
+        if request.data and self.gate.stopped:
+            response.message = f"stopped: {self.gate.stop_reason}; call reset first"
+            return response
+        try:
+            self._switch(request.data)
+            response.success, response.message = True, "enabled" if request.data else "disabled"
+        except Exception as error:
+            self.gate.enable(False)
+            response.message = f"the plant refuses: {error}"
+            self._complain(response.message)
+        return response
+
+    def _on_emergency_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self.gate.stop("emergency stop")
+        response.success, response.message = True, "stopped: 0 V until reset"
+        self.get_logger().warning("emergency stop")
+        try:
+            self._backend.set_enabled(False)
+        except Exception as error:
+            self._complain(f"disabling failed: {error}")
+        return response
+
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            self._backend.reset()
+        except Exception as error:
+            response.message = f"the fault is still there: {error}"
+            return response
+        self.gate.reset()
+        response.success, response.message = True, "released; call enable to let commands through"
+        return response
+
+    def _apply(self, name: str, value: Any) -> None:
+        if name == "watchdog":
+            self.gate.watchdog = value
+        elif self._state != "unconfigured":
+            self._backend.set_parameter(name, value)
+
+    def _autostart(self) -> None:
+        self._starter.cancel()
+        if self.trigger_configure() == SUCCESS:
+            self.trigger_activate()
+
+    def _watch(self) -> None:
+        loop = self._loop
+        if loop is not None and loop.error is not None:
+            self._complain(f"the plant loop ended: {type(loop.error).__name__}: {loop.error}")
+            self.trigger_deactivate()
+        urgent = self._health.urgent()
+        if urgent != self._watched or self._watch_count % _REPORT_EVERY == 0:
+            self._watched = urgent
+            now = self.get_clock().now().nanoseconds if self._loop is None else self._loop.now_ns()
+            self._diagnostics.publish(self._health.message(self._state, self._loop, self._error, now))
+        self._watch_count += 1
+        if self._loop is not None:
+            # The collector is off while the loop runs; what a call or a report left behind is a handful of
+            # objects.
+            gc.collect()
+
+    def _complain(self, problem: str) -> None:
+        self._error = problem
+        self.get_logger().error(problem)

@@ -1,0 +1,84 @@
+"""The contract's topics on the side of the plant, as its loop uses them: no executor in between."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Bool
+
+from hydraulic_interfaces.command_gate import CommandGate
+from hydraulic_interfaces.contract import find_topic
+from hydraulic_interfaces.conversions import (
+    ClockEncoder,
+    MessageError,
+    PressureEncoder,
+    StateEncoder,
+    command_from_message,
+    interface_class,
+)
+from hydraulic_interfaces.nodes.mailbox import Mailbox
+from hydraulic_interfaces.qos import profile
+from hydraulic_interfaces.samples import PlantSample
+
+
+class PlantPorts:
+    """Publishers of a plant and its command subscription, all in the namespace of `node`."""
+
+    def __init__(self, node: Node) -> None:
+        self._state = self._publisher(node, "state")
+        self._pressures = tuple(self._publisher(node, f"pressure_{name}") for name in ("a", "b", "supply"))
+        self._retracted = self._publisher(node, "limit_retracted")
+        self._extended = self._publisher(node, "limit_extended")
+        self._limits: tuple[bool, bool] | None = None
+        self._clock: Any = None
+        self._node = node
+        self._encode_state = StateEncoder()
+        self._encode_pressure = PressureEncoder()
+        self._encode_clock = ClockEncoder()
+        kind = interface_class(find_topic("command").type)
+        self._commands = Mailbox(node, kind, "command", profile("command"))
+
+    def take_commands(self, gate: CommandGate, now_ns: int) -> None:
+        """Put every waiting command through the gate."""
+        for message in self._commands.take():
+            try:
+                command = command_from_message(message)
+            except MessageError as error:
+                gate.reject(str(error))
+            else:
+                gate.accept(command, now_ns)
+
+    def discard_commands(self) -> None:
+        """Forget what came while nobody listened, and what the limit switches last said."""
+        for _ in self._commands.take():
+            pass
+        self._limits = None
+
+    def publish(self, sample: PlantSample) -> None:
+        """Send the sample: state and pressures always, the limit switches when they change."""
+        stamp = sample.stamp_ns
+        self._state.publish(self._encode_state(sample))
+        values = (sample.pressure_a, sample.pressure_b, sample.pressure_supply)
+        for publisher, value in zip(self._pressures, values, strict=True):
+            publisher.publish(self._encode_pressure(stamp, value))
+        limits = (sample.limit_retracted, sample.limit_extended)
+        if limits != self._limits:
+            self._limits = limits
+            self._retracted.publish(Bool(data=limits[0]))
+            self._extended.publish(Bool(data=limits[1]))
+
+    def open_clock(self) -> None:
+        """Become the source of time for every node on simulated time."""
+        if self._clock is None:
+            self._clock = self._node.create_publisher(Clock, "/clock", profile("stream", depth=10))
+
+    def publish_clock(self, stamp_ns: int) -> None:
+        """Send the time."""
+        if self._clock is not None:
+            self._clock.publish(self._encode_clock(stamp_ns))
+
+    @staticmethod
+    def _publisher(node: Node, name: str) -> Any:
+        return node.create_publisher(interface_class(find_topic(name).type), name, profile(name))

@@ -1,0 +1,51 @@
+"""Waiting for absolute deadlines, to some microseconds, on an ordinary kernel."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import threading
+import time
+
+_PR_SET_TIMERSLACK = 29
+# Linux lets a sleep end 50 us late to save power; a thread may ask for less. What remains is the wake-up
+# itself (measured: 30 us median, 80 us p99), which a short spin hides.
+_SPIN_NS = 70_000
+_SPIN_WITH_SLACK_NS = 120_000
+
+
+class Pacer:
+    """Waits for deadlines on the monotonic clock; made and used in the thread that waits."""
+
+    def __init__(self) -> None:
+        self._spin_ns = _SPIN_NS if _without_timer_slack() else _SPIN_WITH_SLACK_NS
+
+    def wait(self, deadline_ns: int) -> int:
+        """Return at `deadline_ns` of `time.monotonic_ns`, at once if it has passed; gives the time then."""
+        clock = time.monotonic_ns
+        rest = deadline_ns - clock() - self._spin_ns
+        if rest > 0:
+            time.sleep(rest * 1e-9)
+        now = clock()
+        while now < deadline_ns:
+            now = clock()
+        return now
+
+
+def _without_timer_slack() -> bool:
+    try:
+        prctl = ctypes.CDLL(None).prctl
+    except (OSError, AttributeError):
+        return False
+    return prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(1), 0, 0, 0) == 0
+
+
+def request_realtime(priority: int) -> str:
+    """Give the calling thread FIFO scheduling; says what it runs with, and why where that is refused."""
+    if not hasattr(os, "sched_setscheduler"):
+        return "normal: this system has no real-time scheduling"
+    try:
+        os.sched_setscheduler(threading.get_native_id(), os.SCHED_FIFO, os.sched_param(priority))
+    except (OSError, ValueError) as error:
+        return f"normal: FIFO {priority} needs an rtprio limit of at least that ({error})"
+    return f"FIFO {priority}"

@@ -1,0 +1,71 @@
+"""What a plant node needs from a plant: the seam between the contract and a simulated or real bench."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_interfaces.samples import PlantSample
+
+
+class BackendError(RuntimeError):
+    """The plant cannot do what was asked of it; the text tells the user what is wrong and what to do."""
+
+
+class PlantBackend(ABC):
+    """A plant behind the contract. Lifecycle calls come from one thread, `step` from the plant loop's own.
+
+    `configure` → `activate` → `step` … `step` → `deactivate` → `cleanup`; any of the first three may raise,
+    preferably `BackendError`, `ValueError` or `OSError` with a text for the user.
+    """
+
+    hardware_id: str = "plant"
+    """Shown in the diagnostics."""
+
+    catch_up: int = 0
+    """How many missed cycles are made up for, late but at their own sampling instants (a simulation can, a
+    real plant cannot); what is missed beyond is skipped and counted."""
+
+    fault: str = ""
+    """What is wrong with the plant while it is wrong: the node then holds 0 V until `reset`."""
+
+    def parameters(self) -> Sequence[ParameterSpec]:
+        """Parameters known before anything is loaded; their values come with `configure`."""
+        return ()
+
+    @abstractmethod
+    def configure(self, values: Mapping[str, Any]) -> Sequence[ParameterSpec]:
+        """Load, connect, compile: whatever takes long. Returns the parameters that are known only now."""
+
+    def set_parameter(self, name: str, value: Any) -> None:  # noqa: B027 - nothing to set is a valid plant
+        """Take the new value of a live parameter, from the next step on."""
+
+    @abstractmethod
+    def activate(self) -> None:
+        """Make ready to be stepped, at 0 V."""
+
+    def set_enabled(self, on: bool) -> None:  # noqa: B027 - a plant without an enable is a valid plant
+        """Follow the gate: commands move the actuator from now on, or no longer."""
+
+    @abstractmethod
+    def step(self, stamp_ns: int, drive: float, dt: float) -> PlantSample:
+        """The sample of the instant `stamp_ns`; `drive` [V] is applied from this instant on, for `dt` [s].
+
+        `drive` is finite and within the limits. The sample's drive is what was really applied.
+        """
+
+    @abstractmethod
+    def deactivate(self) -> None:
+        """0 V and disabled. Called from any state, also after an error, and more than once."""
+
+    def reset(self) -> None:  # noqa: B027 - a plant without faults of its own has nothing to reset
+        """Clear `fault` where its cause is gone; raises BackendError where it is not."""
+
+    def cleanup(self) -> None:  # noqa: B027 - nothing to release is valid
+        """Release what `configure` took. Called once after each `configure`, also a failed one."""
+
+    def report(self) -> Mapping[str, str]:
+        """Further rows for the diagnostics."""
+        return {}

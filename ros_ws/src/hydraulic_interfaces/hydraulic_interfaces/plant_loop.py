@@ -1,0 +1,175 @@
+"""The thread that runs a plant: one cycle per sampling instant, on absolute deadlines.
+
+A cycle: take the commands that have come, ask the gate for the drive, step the plant, publish its sample.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from hydraulic_interfaces.command_gate import CommandGate
+from hydraulic_interfaces.pacing import Pacer, request_realtime
+from hydraulic_interfaces.plant_backend import PlantBackend
+from hydraulic_interfaces.rate_monitor import RateMonitor
+from hydraulic_interfaces.samples import PlantSample
+
+# The interpreter hands over between threads at this interval; the usual 5 ms is five cycles.
+_SWITCH_INTERVAL_S = 5e-5
+# A plant that keeps its own clock gives up on the asked speed when it is this many cycles behind.
+_OWN_CLOCK_CATCH_UP = 50
+
+
+class LoopPorts(Protocol):
+    """Where commands come from and samples go to."""
+
+    def take_commands(self, gate: CommandGate, now_ns: int) -> None:
+        """Put every waiting command through the gate."""
+
+    def publish(self, sample: PlantSample) -> None:
+        """Send a sample to everybody."""
+
+    def publish_clock(self, stamp_ns: int) -> None:
+        """Tell everybody the time; called only by a plant with a clock of its own."""
+
+
+@dataclass(frozen=True)
+class LoopTiming:
+    """Sampling `period_ns` in plant time; `factor` plant seconds per wall second, 1 unless `own_clock`.
+
+    With `own_clock` the plant's time is published and everybody else follows it; without, it is wall time.
+    `priority` > 0 asks for real-time scheduling, and does without where it is not permitted.
+    """
+
+    period_ns: int
+    factor: float = 1.0
+    own_clock: bool = False
+    priority: int = 0
+
+    def __post_init__(self) -> None:
+        if self.factor != 1.0 and not self.own_clock:
+            raise ValueError(
+                f"real_time_factor is {self.factor:g}: only with publish_clock may it differ from 1"
+            )
+
+
+class PlantLoop:
+    """Runs `backend` from `start` to `stop`; `error` holds the exception that ended it, if one did.
+
+    Samples are stamped with their scheduled sampling instant. `last_stamp_ns` carries on from an earlier run,
+    so that stamps increase even if the wall clock was set back in between.
+    """
+
+    def __init__(
+        self,
+        backend: PlantBackend,
+        gate: CommandGate,
+        ports: LoopPorts,
+        timing: LoopTiming,
+        last_stamp_ns: int = 0,
+    ) -> None:
+        self.monitor = RateMonitor(max(round(timing.period_ns / timing.factor), 1))
+        self.error: Exception | None = None
+        self.scheduling = "normal"
+        self.samples = 0
+        self.drive = 0.0
+        self.last_stamp_ns = last_stamp_ns
+        self._backend, self._gate, self._ports, self._timing = backend, gate, ports, timing
+        self._stopping = False
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="plant_loop", daemon=True)
+        self._switch_interval = sys.getswitchinterval()
+        self._wall_offset_ns = 0
+
+    def start(self) -> None:
+        """Start the thread; the first sample comes one period later."""
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        sys.setswitchinterval(_SWITCH_INTERVAL_S)
+        self._thread.start()
+
+    def stop(self, timeout: float = 2.0) -> bool:
+        """End with a last sample at 0 V and a deactivated backend; False if the backend hangs."""
+        self._stopping = True
+        ended = self._ended.wait(timeout)
+        sys.setswitchinterval(self._switch_interval)
+        gc.enable()
+        gc.unfreeze()
+        return ended
+
+    @property
+    def alive(self) -> bool:
+        """Whether the thread runs."""
+        return self._thread.is_alive() and not self._ended.is_set()
+
+    def now_ns(self) -> int:
+        """The present in the clock of the stamps."""
+        return self.last_stamp_ns if self._timing.own_clock else time.time_ns()
+
+    def wall_clock_step(self) -> float:
+        """How far the wall clock was set since the start, s; the stamps do not follow it."""
+        return (time.time_ns() - time.monotonic_ns() - self._wall_offset_ns) * 1e-9
+
+    def _run(self) -> None:
+        try:
+            if self._timing.priority > 0:
+                self.scheduling = request_realtime(self._timing.priority)
+            self._cycle(Pacer().wait)
+        except (
+            Exception
+        ) as error:  # whatever a backend throws, the drive must end at 0 V and somebody must hear
+            self.error = error
+            self._gate.stop(f"plant loop failed: {error}")
+        finally:
+            self.drive = 0.0
+            try:
+                self._backend.deactivate()
+            except Exception as error:
+                self.error = self.error or error
+            self._ended.set()
+
+    def _cycle(self, wait: Callable[[int], int]) -> None:
+        timing, gate, ports, monitor = self._timing, self._gate, self._ports, self.monitor
+        wall_period = timing.period_ns / timing.factor
+        catch_up = _OWN_CLOCK_CATCH_UP if timing.own_clock else self._backend.catch_up
+        origin = time.monotonic_ns() + round(wall_period)
+        self._wall_offset_ns = time.time_ns() - time.monotonic_ns()
+        first_stamp = max(origin + self._wall_offset_ns, self.last_stamp_ns + timing.period_ns)
+        slot = 0
+        while not self._stopping:
+            due = origin + round(slot * wall_period)
+            actual = wait(due)
+            behind = int((actual - due) / wall_period)
+            lost = max(behind - catch_up, 0)
+            monitor.tick(due, actual, 0 if timing.own_clock else lost)
+            if timing.own_clock:
+                # Its own time cannot be missed, it only passes more slowly than asked.
+                origin += round(lost * wall_period)
+            else:
+                slot += lost
+            stamp = first_stamp + slot * timing.period_ns
+            now = stamp if timing.own_clock else time.time_ns()
+            if timing.own_clock:
+                ports.publish_clock(stamp + (behind - lost) * timing.period_ns)
+            ports.take_commands(gate, now)
+            if self._backend.fault:
+                gate.stop(self._backend.fault)
+            drive = gate.drive(now)
+            for _ in range(behind - lost + 1):
+                self._sample(first_stamp + slot * timing.period_ns, drive)
+                slot += 1
+        wait(origin + round(slot * wall_period))
+        self._sample(first_stamp + slot * timing.period_ns, 0.0)
+
+    def _sample(self, stamp_ns: int, drive: float) -> None:
+        sample = self._backend.step(stamp_ns, drive, self._timing.period_ns * 1e-9)
+        self._ports.publish(sample)
+        self.drive = sample.drive
+        self.last_stamp_ns = sample.stamp_ns
+        self.samples += 1

@@ -1,0 +1,30 @@
+"""QoS profiles of the contract's classes: "stream", "latched" and "diagnostics"."""
+
+from __future__ import annotations
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from hydraulic_interfaces.contract import find_topic
+
+STREAM_DEPTH = 100
+
+_CLASSES = {
+    "stream": (DurabilityPolicy.VOLATILE, STREAM_DEPTH),
+    "latched": (DurabilityPolicy.TRANSIENT_LOCAL, 1),
+    "diagnostics": (DurabilityPolicy.VOLATILE, 10),
+}
+
+
+def profile(name: str, depth: int | None = None) -> QoSProfile:
+    """Profile of a QoS class or of a topic of the contract; `depth` replaces the default history depth.
+
+    All are reliable and keep the last `depth`; a subscriber that must not lose a sample while its process is
+    held up asks for more (a recorder at 1 kHz: some thousands).
+    """
+    durability, usual = _CLASSES[name if name in _CLASSES else find_topic(name).qos]
+    return QoSProfile(
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=durability,
+        history=HistoryPolicy.KEEP_LAST,
+        depth=usual if depth is None else depth,
+    )

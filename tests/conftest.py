@@ -1,0 +1,203 @@
+"""Fixtures of all tests: a private ROS domain, real processes, and a client that talks to them."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PATIENCE_S = 30.0
+
+
+def wait_until(condition: Callable[[], Any], what: str, patience: float = PATIENCE_S) -> Any:
+    """The first true value of `condition`; fails the test with `what` if none comes in time."""
+    deadline = time.monotonic() + patience
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            pytest.fail(f"waited {patience:g} s in vain for {what}")
+        time.sleep(0.01)
+
+
+class Process:
+    """A child in a process group of its own; everything it prints goes to one file."""
+
+    def __init__(self, command: list[str], log: Path, cwd: Path | None = None) -> None:
+        self.command = command
+        self.log = log
+        with log.open("wb") as sink:
+            self.popen = subprocess.Popen(
+                command,
+                stdout=sink,
+                stderr=subprocess.STDOUT,
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+                cwd=cwd,
+            )
+
+    def output(self) -> str:
+        """What it has printed so far."""
+        return self.log.read_text(errors="replace")
+
+    def says(self, text: str, patience: float = PATIENCE_S) -> None:
+        """Wait until it has printed `text`."""
+        wait_until(
+            lambda: text in self.output() or self.popen.poll() is not None,
+            f"{text!r} from {self.command}",
+            patience,
+        )
+        assert text in self.output(), self.output()
+
+    def interrupt(self, number: int = signal.SIGINT) -> None:
+        """Send a signal to its group."""
+        os.killpg(self.popen.pid, number)
+
+    def wait(self, patience: float = PATIENCE_S) -> int:
+        """Exit code, once it has ended by itself."""
+        try:
+            return self.popen.wait(patience)
+        except subprocess.TimeoutExpired:
+            pytest.fail(f"{self.command} did not end within {patience:g} s:\n{self.output()}")
+
+    def end(self) -> None:
+        """Kill the whole group, and wait."""
+        if self.popen.poll() is None:
+            self.interrupt()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.popen.wait(5.0)
+        # The leader may be gone and have left children behind.
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.popen.pid, signal.SIGKILL)
+        self.popen.wait()
+
+
+@pytest.fixture
+def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A ROS domain of this test's own, on this machine only, in the environment of it and of its children."""
+    domain_coordinator = pytest.importorskip("domain_coordinator")
+    with domain_coordinator.domain_id() as number:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
+        monkeypatch.setenv("PYTHONUNBUFFERED", "1")
+        yield number
+
+
+@pytest.fixture
+def launch(ros_domain: int, tmp_path: Path) -> Iterator[Callable[..., Process]]:
+    """Starts processes in the private domain: `launch("hydraulic_sim.nodes.simulator", "--autostart")`.
+
+    The first argument is a module, or the path of a script. All process groups are killed at the end.
+    """
+    started: list[Process] = []
+
+    def start(target: str | Path, *arguments: str) -> Process:
+        program = [str(target)] if str(target).endswith(".py") else ["-m", str(target)]
+        log = tmp_path / f"process_{len(started)}.log"
+        started.append(Process([sys.executable, *program, *arguments], log))
+        return started[-1]
+
+    yield start
+    for process in reversed(started):
+        process.end()
+
+
+class Client:
+    """A node in the test's process: subscriptions that collect, publishers, service and parameter calls."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        self.node = rclpy.create_node("test_client", namespace="/test", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._running = True
+        self._thread.start()
+
+    def _spin(self) -> None:
+        while self._running:
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def collect(self, name: str, depth: int = 5000) -> list[Any]:
+        """A list that grows by every message on a topic of the contract."""
+        from hydraulic_interfaces.contract import find_topic, topic
+        from hydraulic_interfaces.conversions import interface_class
+        from hydraulic_interfaces.qos import profile
+
+        heard: list[Any] = []
+        kind = interface_class(find_topic(name).type)
+        self.node.create_subscription(kind, topic(name), heard.append, profile(name, depth))
+        self._executor.wake()
+        return heard
+
+    def publisher(self, name: str) -> Any:
+        """A publisher on a topic of the contract."""
+        from hydraulic_interfaces.contract import find_topic, topic
+        from hydraulic_interfaces.conversions import interface_class
+        from hydraulic_interfaces.qos import profile
+
+        return self.node.create_publisher(interface_class(find_topic(name).type), topic(name), profile(name))
+
+    def call(self, kind: str, name: str, patience: float = PATIENCE_S, **fields: Any) -> Any:
+        """Response of a service of type `kind` ("std_srvs/srv/Trigger") at the full name `name`."""
+        from hydraulic_interfaces.conversions import interface_class
+
+        service = interface_class(kind)
+        client = self.node.create_client(service, name)
+        try:
+            assert client.wait_for_service(timeout_sec=patience), f"no service {name}"
+            future = client.call_async(service.Request(**fields))
+            self._executor.wake()
+            return wait_until(lambda: future.done() and future.result(), f"an answer from {name}", patience)
+        finally:
+            self.node.destroy_client(client)
+
+    def change_state(self, label: str, node: str = "/actuator/plant", patience: float = 60.0) -> bool:
+        """Whether the managed node did the transition ("configure", "activate", …)."""
+        from lifecycle_msgs.msg import Transition
+
+        answer = self.call(
+            "lifecycle_msgs/srv/ChangeState",
+            f"{node}/change_state",
+            patience,
+            transition=Transition(id=getattr(Transition, f"TRANSITION_{label.upper()}")),
+        )
+        return bool(answer.success)
+
+    def state(self, node: str = "/actuator/plant") -> str:
+        """Lifecycle state of a managed node by its label."""
+        return str(self.call("lifecycle_msgs/srv/GetState", f"{node}/get_state").current_state.label)
+
+    def close(self) -> None:
+        """Take the node down."""
+        import rclpy
+
+        self._running = False
+        self._executor.wake()
+        self._thread.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+
+@pytest.fixture
+def client(ros_domain: int) -> Iterator[Client]:
+    """A ROS client in the private domain."""
+    one = Client()
+    yield one
+    one.close()
