@@ -10,6 +10,7 @@ import hashlib
 import importlib.util
 import os
 import platform
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
@@ -55,13 +56,21 @@ def _load(library: Library) -> ModuleType:
     for part in (
         text,
         library.fingerprint,
-        Path(kernels.__file__).read_text(encoding="utf-8"),
+        *(Path(f).read_text(encoding="utf-8") for f in (kernels.__file__, __file__)),
         numba.__version__,
         platform.python_version(),
     ):
         digest.update(part.encode())
     key = digest.hexdigest()[:20]
     file = cache_root() / key / f"plant_{key}.py"
+    try:
+        return _execute(file, text, library)
+    except Exception:  # a cache that another version or a crash left unreadable is worth one clean attempt
+        shutil.rmtree(file.parent, ignore_errors=True)
+        return _execute(file, text, library)
+
+
+def _execute(file: Path, text: str, library: Library) -> ModuleType:
     if not file.is_file():
         _write_once(file, text)
     spec = importlib.util.spec_from_file_location(file.stem, file)

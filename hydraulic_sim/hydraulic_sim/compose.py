@@ -22,6 +22,8 @@ from .effect import Effect, State, arguments
 from .registry import Library
 
 SUBSTEP_SAFETY = 1.2  # substep × fastest pressure rate; RK4 is stable up to 2.78
+REVERSAL_BEND = 0.02  # sliding within one step, of the bristle length, from which a reversal is refined
+REVERSAL_STEP = 0.125  # and by how much
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,8 @@ class Writer:
             indices = [self.layout.effects[e.name] for e in self.members(name)]
             test = " or ".join(f"on[{i}] != 0" for i in indices) or "False"
             lines.append(f"any_{name} = {test}")
+        dry = [e.name for e in self.layout.library.values() if any("direction" in arguments(f) for f in e.functions().values())]
+        lines.append("any_direction = " + (" or ".join(f"on[{self.layout.effects[n]}] != 0" for n in dry) or "False"))
         return "\n".join(lines)
 
     def constants(self) -> str:
@@ -290,6 +294,10 @@ def run(drive, dt, start, max_step, on, P, hydraulic, X, M, Y, failure):
                     wanted = max_step
                     if pressure_rate * wanted > {safety}:
                         wanted = {safety} / pressure_rate
+                    # a reversal of dry friction bends the trajectory: cross it in short steps
+                    swing = abs(K[1]) * wanted
+                    if any_direction and abs(velocity) < 2.0 * swing and swing * wanted > {bend} * bristle_length:
+                        wanted *= {shorter}
                     if wanted < remaining:
                         h = remaining / math.ceil(remaining / wanted * 0.999999)
                     else:
@@ -352,7 +360,7 @@ def write_module(library: Library) -> str:
     )
     return _fill(
         _MODULE, functions=functions, n_rates=layout.n_rates, n_states=len(layout.states), constants1=w.constants(),
-        switches1=w.switches(), rhs1=rhs, rhs4=rhs, safety=SUBSTEP_SAFETY, most=MOST_SUBSTEPS,
+        switches1=w.switches(), rhs1=rhs, rhs4=rhs, safety=SUBSTEP_SAFETY, bend=REVERSAL_BEND, shorter=REVERSAL_STEP, most=MOST_SUBSTEPS,
         command=shared["command"], position_sensor7=shared["position_sensor"],
         pressure_sensor7=shared["pressure_sensor"],
     )  # fmt: skip
