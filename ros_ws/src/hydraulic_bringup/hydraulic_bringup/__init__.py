@@ -1,0 +1,1 @@
+"""Top floor: the entry `./bench`, launch files, parameter files and the demo."""
