@@ -1,0 +1,1 @@
+"""Verbs of the command line: one file, one verb, each with a `main(argv)` that returns the exit code."""
