@@ -27,13 +27,14 @@ CACHE_VARIABLE = "HYDRAULIC_SIM_CACHE"
 
 
 class CompiledPlant:
-    """The compiled functions of one library (`rhs`, `run`) and the layout of their arrays."""
+    """The compiled functions of one library (`rhs`, `run`, `run_many`) and the layout of their arrays."""
 
     def __init__(self, library: Library) -> None:
         self.layout = Layout(library)
         self.module = _load(library)
         self.rhs: Callable = self.module.rhs
         self.run: Callable = self.module.run
+        self.run_many: Callable = self.module.run_many
 
 
 def cache_root() -> Path:

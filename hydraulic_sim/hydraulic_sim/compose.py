@@ -24,6 +24,7 @@ from .registry import Library
 SUBSTEP_SAFETY = 1.2  # substep × fastest pressure rate; RK4 is stable up to 2.78
 REVERSAL_BEND = 0.02  # sliding within one step, of the bristle length, from which a reversal is refined
 REVERSAL_STEP = 0.125  # and by how much
+MOST_SUBSTEPS = 2000  # in one sample; beyond, the physics is called too stiff
 
 
 @dataclass(frozen=True)
@@ -338,9 +339,41 @@ def run(drive, dt, start, max_step, on, P, hydraulic, X, M, Y, failure):
                 failure[0] = now; failure[1] = count
                 return k
     return len(drive)
+
+
+@njit("void(f8[::1], f8, f8, u1[::1], f8[::1], f8[::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
+def prime(drive, dt, start, on, P, X, M):
+    """Lets the memories of the command effects see a drive of the past; nothing moves."""
+    {constants1}
+    {switches1}
+    position = X[0]; velocity = X[1]; pressure_a = X[2]; pressure_b = X[3]
+    load_pressure = pressure_a - pressure_b
+    if any_command:
+        for k in range(len(drive)):
+            t = start + k * dt
+            command = clamp(drive[k] / drive_limit, -1.0, 1.0)
+            {command}
+
+
+@njit("i8(f8[::1], f8, f8, i8[::1], i8, i8, f8[:, ::1], i8, u1[::1], f8[::1], u1, f8[:, :, ::1], f8[::1])",
+      cache=True, nogil=True, error_model="numpy")
+def run_many(drive, dt, max_step, starts, count, past, states, n_memory, on, P, hydraulic, Y, failure):
+    """Runs ``count`` samples from each start, the memories primed over ``past`` samples. Returns the starts done."""
+    X = np.empty(NX)
+    M = np.zeros(n_memory)
+    for i in range(len(starts)):
+        first = starts[i]
+        before = max(first - past, 0)
+        X[:] = states[i]
+        M[:] = 0.0
+        if past > 0:
+            prime(drive[before:first], dt, before * dt, on, P, X, M)
+        done = run(drive[first:first + count], dt, first * dt, max_step, on, P, hydraulic, X, M, Y[i], failure)
+        if done < count:
+            return i
+    return len(starts)
 '''
 
-MOST_SUBSTEPS = 2000
 
 
 def write_module(library: Library) -> str:

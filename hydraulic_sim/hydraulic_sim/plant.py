@@ -17,6 +17,7 @@ from .registry import library
 
 Array = NDArray[np.float64]
 
+LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 STEP_TIMES_RATE = 0.6  # how much of the fastest stated rate one step may cover
 
@@ -93,6 +94,7 @@ class Plant:
             self._on[layout.effects[name]] = 1
         self._parameters = np.array([model.value(key) for key in layout.parameters])
         self._hydraulic = np.uint8(model.kind == "hydraulic")
+        self._remembers = any(layout.library[name].slot == "command" for name in active)
         self.longest_step = self._step_limit(active, longest_step)
 
     def _step_limit(self, active: tuple[str, ...], longest: float) -> float:
@@ -181,6 +183,37 @@ class Plant:
             final=PlantState(x, memory, begin.time + dt * len(u)),
             **columns,
         )
+
+    def predict(
+        self, drive: ArrayLike, dt: float, starts: ArrayLike, horizon: int, initial_states: ArrayLike
+    ) -> dict[str, Array]:
+        """Many short runs over one drive, each from a state of its own.
+
+        ``starts`` (S,) sample indices into ``drive`` (N,); ``horizon`` samples ahead, ``starts + horizon`` < N;
+        ``initial_states`` (S, n_states). Returns channel → (S, horizon + 1), column 0 being the start itself.
+        Effects on the command remember the drive before each start. Raises `SimulationError` as `simulate` does.
+        """
+        u = np.ascontiguousarray(drive, dtype=np.float64)
+        first = np.ascontiguousarray(starts, dtype=np.int64)
+        states = np.ascontiguousarray(initial_states, dtype=np.float64)
+        if len(first) and (first.min() < 0 or first.max() + horizon >= len(u)):
+            raise SimulationError(f"starts {first.min()}…{first.max()} and a horizon of {horizon} leave the {len(u)} samples")
+        if states.shape != (len(first), len(self.layout.states)):
+            raise SimulationError(
+                f"initial_states has the shape {states.shape}; expected {(len(first), len(self.layout.states))}"
+            )
+        out = np.empty((len(first), horizon + 1, len(base.OUTPUTS)))
+        failure = np.zeros(2)
+        past = LONGEST_MEMORY if self._remembers else 0
+        done = self._compiled.run_many(
+            u, dt, self.longest_step, first, horizon + 1, past, states, self.layout.n_memory, self._on,
+            self._parameters, self._hydraulic, out, failure,
+        )  # fmt: skip
+        if done < len(first):
+            raise SimulationError(
+                f"the run from sample {first[done]} failed at t = {failure[0]:.6g} s (not finite, or too stiff)"
+            )
+        return {name: out[:, :, i] for i, name in enumerate(base.OUTPUTS)}
 
     def _advance(self, u: Array, dt: float, start: float, x: Array, memory: Array, out: Array) -> None:
         failure = np.zeros(2)
