@@ -1,9 +1,8 @@
-"""Build of the ROS 2 package hydraulic_interfaces: a library; its nodes/ holds base classes, no executables."""
+"""Build of the ROS 2 package hydraulic_interfaces: a library, its nodes/ holds base classes."""
 
 from setuptools import find_packages, setup
 
 NAME = "hydraulic_interfaces"
-
 
 setup(
     name=NAME,

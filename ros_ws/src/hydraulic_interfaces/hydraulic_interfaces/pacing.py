@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import threading
@@ -49,3 +50,10 @@ def request_realtime(priority: int) -> str:
     except (OSError, ValueError) as error:
         return f"normal: FIFO {priority} needs an rtprio limit of at least that ({error})"
     return f"FIFO {priority}"
+
+
+def release_realtime(thread_id: int) -> None:
+    """Give a thread (`threading.get_native_id`) normal scheduling again; nothing happens if it is gone."""
+    if hasattr(os, "sched_setscheduler"):
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(thread_id, os.SCHED_OTHER, os.sched_param(0))
