@@ -8,6 +8,8 @@ from pathlib import Path
 
 from .errors import UsageError
 
+SHOWN = 12  # names in a message; a whole ROS 2 has hundreds
+
 
 def executables(prefixes: list[Path]) -> dict[str, dict[str, Path]]:
     """Executables by package and name; of several prefixes the first counts.
@@ -30,7 +32,7 @@ def find(prefixes: list[Path], package: str, executable: str) -> Path:
     """
     known = executables(prefixes)
     if package not in known:
-        offered = sorted(name for name, files in known.items() if files)
+        offered = [name for name, files in known.items() if files]  # those of the workspace come first
         raise UsageError(
             f"There is no package {package!r}.", remedy=f"packages with executables: {_listed(offered)}"
         )
@@ -43,4 +45,5 @@ def find(prefixes: list[Path], package: str, executable: str) -> Path:
 
 
 def _listed(names: Iterable[str]) -> str:
-    return ", ".join(names) or "none"
+    shown, hidden = list(names)[:SHOWN], len(list(names)) - SHOWN
+    return (", ".join(shown) or "none") + (f" and {hidden} more" if hidden > 0 else "")
