@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import pwd
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Mapping
 
@@ -20,7 +22,7 @@ class Bench:
 
     def __init__(self, checkout: Checkout, environ: Mapping[str, str]) -> None:
         self.checkout = checkout
-        self.environ = without_foreign(environ)
+        self.environ = with_home(without_foreign(environ))
         self.ros: Ros = sourced(self.environ)
 
     def variables(self) -> dict[str, str]:
@@ -44,10 +46,6 @@ class Bench:
         with exclusive(self.checkout.logs / "lock") as lock:
             todo = virtualenv.current(self.checkout, need)  # another ./bench may have done it meanwhile
             if todo.action != "keep":
-                if todo.action != "install":
-                    print(
-                        "First set-up: about a minute, more on a slow network.", file=sys.stderr, flush=True
-                    )
                 virtualenv.carry_out(todo, need, self.checkout, self.ros, self.environ, lock)
             state = self._state(need)
             packages = list(state.sources) if rebuild else list(state.stale())
@@ -80,3 +78,14 @@ class Bench:
             signal.signal(ignored, signal.SIG_DFL)
         variables = self.variables() if variables is None else variables
         os.execvpe(command[0], command, dict(variables))
+
+
+def with_home(environ: Mapping[str, str]) -> dict[str, str]:
+    """`environ` with a home folder: without one rclpy has no place for its log files and does not start."""
+    if environ.get("HOME"):
+        return dict(environ)
+    try:
+        home = pwd.getpwuid(os.getuid()).pw_dir
+    except KeyError:  # a user id without a name, as containers have it
+        home = ""
+    return {**environ, "HOME": home if os.access(home, os.W_OK) else tempfile.gettempdir()}

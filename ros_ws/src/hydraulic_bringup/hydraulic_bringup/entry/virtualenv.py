@@ -21,19 +21,20 @@ from .steps import run_step
 
 STAMP = "bench.json"
 PIP = "pip>=25.1"  # the first that reads dependency groups
+INSTALLING, CHECKING, READY = "installing", "checking", "ready"
 IMPORTS = "import numpy, numba, scipy, rclpy; rclpy.init(); rclpy.shutdown()"
 
 
 @dataclass(frozen=True)
 class Stamp:
-    """What an environment was made of; kept in it. `complete`: all was installed, and rclpy started."""
+    """What an environment was made of; kept in it, with the stage its making has reached."""
 
     root: str
     base: str
     python: str
     ros: str
     pins: str
-    complete: bool = True
+    stage: str = READY
 
     @classmethod
     def read(cls, venv: Path) -> Stamp | None:
@@ -52,7 +53,7 @@ class Stamp:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to do: `keep`, `install` into what is there, `create` anew, `move` what is not ours away first."""
+    """What to do: `keep`, `check`, `install` into it, `create` anew, `move` what is not ours away first."""
 
     action: str
     reason: str = ""
@@ -89,7 +90,7 @@ def plan(found: Stamp | None, wanted: Stamp, *, exists: bool, starts: bool) -> P
         return Plan("create")
     if found is None:
         return Plan("move", "the .venv here was not made by ./bench")
-    if not found.complete:
+    if found.stage == INSTALLING:
         return Plan("create", "the last set-up was not finished")
     if not starts:
         return Plan("create", f"its Python ({found.base}) is gone")
@@ -101,7 +102,7 @@ def plan(found: Stamp | None, wanted: Stamp, *, exists: bool, starts: bool) -> P
         return Plan("create", f"ROS 2 is now {wanted.ros}, was {found.ros}")
     if found.pins != wanted.pins:
         return Plan("install", "the pinned versions changed")
-    return Plan("keep")
+    return Plan("keep") if found.stage == READY else Plan("check", "it has not been seen to work yet")
 
 
 def wanted(checkout: Checkout, ros: Ros, *, named: bool) -> Stamp:
@@ -137,22 +138,23 @@ def carry_out(
 ) -> None:
     """Do what `todo` says; call with the lock held.
 
-    :raises BenchError: a step failed; the environment is then marked as incomplete, or left as it was
+    :raises BenchError: a step failed; the stamp then says from where to go on
     """
     if todo.reason:
         print(f"Python environment: {todo.reason}.", file=sys.stderr, flush=True)
     if todo.action in ("create", "move"):
+        print("Setting up takes about a minute, more on a slow network.", file=sys.stderr, flush=True)
         _create(todo, need, checkout, ros, environ, lock)
     before = Stamp.read(checkout.venv)
     assert before is not None
-    replace(need, complete=False).write(checkout.venv)
-    try:
-        _install(checkout, ros, environ, lock)
-    except BenchError:
-        before.write(
-            checkout.venv
-        )  # pip gives up before it changes anything: offline, the old pins still work
-        raise
+    if todo.action != "check":
+        replace(need, stage=INSTALLING).write(checkout.venv)
+        try:
+            _install(checkout, ros, environ, lock)
+        except BenchError:
+            before.write(checkout.venv)  # pip gives up before it changes anything: what was there still works
+            raise
+        replace(need, stage=CHECKING).write(checkout.venv)
     _check(checkout, ros, environ, lock)
     need.write(checkout.venv)
 
@@ -163,7 +165,7 @@ def _create(
     _require_venv(need)
     try:
         _clear(todo, checkout.venv)
-        replace(need, complete=False).write(checkout.venv)
+        replace(need, stage=INSTALLING).write(checkout.venv)
     except OSError as error:
         raise BenchError(
             f"Cannot replace {checkout.venv}.",
@@ -209,7 +211,7 @@ def _install(checkout: Checkout, ros: Ros, environ: Mapping[str, str], lock: int
             environ=_clean(environ, ros),
             cwd=checkout.root,
             remedy="Check the network, the proxy and the package index (PIP_INDEX_URL or pip.conf), "
-            "then call ./bench again: it goes on from here.",
+            "then call ./bench again.",
             describe=_describe_pip,
             keep_open=[lock],
         )
