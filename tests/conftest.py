@@ -18,7 +18,7 @@ import pytest
 PATIENCE_S = 30.0
 
 
-def wait_until(condition: Callable[[], Any], what: str, patience: float = PATIENCE_S) -> Any:
+def _wait_until(condition: Callable[[], Any], what: str, patience: float = PATIENCE_S) -> Any:
     """The first true value of `condition`; fails the test with `what` if none comes in time."""
     deadline = time.monotonic() + patience
     while True:
@@ -52,7 +52,7 @@ class Process:
 
     def says(self, text: str, patience: float = PATIENCE_S) -> None:
         """Wait until it has printed `text`."""
-        wait_until(
+        _wait_until(
             lambda: text in self.output() or self.popen.poll() is not None,
             f"{text!r} from {self.command}",
             patience,
@@ -80,6 +80,12 @@ class Process:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.popen.pid, signal.SIGKILL)
         self.popen.wait()
+
+
+@pytest.fixture(name="wait_until", scope="session")
+def wait_until_fixture() -> Callable[..., Any]:
+    """`wait_until(condition, what, patience)`: the first true value of `condition`, or a failed test."""
+    return _wait_until
 
 
 @pytest.fixture
@@ -133,6 +139,10 @@ class Client:
         while self._running:
             self._executor.spin_once(timeout_sec=0.1)
 
+    def wake(self) -> None:
+        """Let the spinning thread see what was created."""
+        self._executor.wake()
+
     def collect(self, name: str, depth: int = 5000) -> list[Any]:
         """A list that grows by every message on a topic of the contract."""
         from hydraulic_interfaces.contract import find_topic, topic
@@ -142,7 +152,7 @@ class Client:
         heard: list[Any] = []
         kind = interface_class(find_topic(name).type)
         self.node.create_subscription(kind, topic(name), heard.append, profile(name, depth))
-        self._executor.wake()
+        self.wake()
         return heard
 
     def publisher(self, name: str) -> Any:
@@ -163,7 +173,7 @@ class Client:
             assert client.wait_for_service(timeout_sec=patience), f"no service {name}"
             future = client.call_async(service.Request(**fields))
             self._executor.wake()
-            return wait_until(lambda: future.done() and future.result(), f"an answer from {name}", patience)
+            return _wait_until(lambda: future.done() and future.result(), f"an answer from {name}", patience)
         finally:
             self.node.destroy_client(client)
 
@@ -183,6 +193,14 @@ class Client:
         """Lifecycle state of a managed node by its label."""
         return str(self.call("lifecycle_msgs/srv/GetState", f"{node}/get_state").current_state.label)
 
+    def source(self, name: str, drive: float, period: float = 0.005) -> Source:
+        """A source that commands `drive` [V] from now on, until it is stopped."""
+        return Source(self, name, drive, period)
+
+    def diagnostics(self) -> Diagnostics:
+        """What the plant says about itself from now on."""
+        return Diagnostics(self.collect("diagnostics"))
+
     def close(self) -> None:
         """Take the node down."""
         import rclpy
@@ -193,6 +211,54 @@ class Client:
         self._executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
+
+
+class Diagnostics:
+    """The newest diagnostics of the plant."""
+
+    def __init__(self, heard: list[Any]) -> None:
+        self._heard = heard
+
+    def values(self) -> dict[str, str]:
+        """All values by key, and per part ("command", "timing", "plant") its message and "<part> level"."""
+        found: dict[str, str] = {}
+        for message in self._heard[-20:]:
+            for status in message.status:
+                if status.name.startswith("/actuator/plant: "):
+                    part = status.name.partition(": ")[2]
+                    found |= {entry.key: entry.value for entry in status.values}
+                    found |= {part: status.message, f"{part} level": str(ord(status.level))}
+        return found
+
+    def __getitem__(self, key: str) -> str:
+        return self.values().get(key, "")
+
+    def count(self, key: str) -> int:
+        """A counter; 0 before anything was heard."""
+        return int(self[key] or 0)
+
+
+class Source:
+    """Commands a plant like any other source, over the topic; `drive` and `age` [s] may be changed."""
+
+    def __init__(self, client: Client, name: str, drive: float, period: float) -> None:
+        self._client, self._name, self.drive, self.age = client, name, drive, 0.0
+        self._publisher = client.publisher("command")
+        self._timer = client.node.create_timer(period, self._publish)
+        client.wake()
+
+    def _publish(self) -> None:
+        from hydraulic_interfaces.conversions import command_to_message
+        from hydraulic_interfaces.samples import Command
+
+        now = self._client.node.get_clock().now().nanoseconds
+        self._publisher.publish(
+            command_to_message(Command(now - round(self.age * 1e9), self._name, self.drive))
+        )
+
+    def stop(self) -> None:
+        """Fall silent."""
+        self._timer.cancel()
 
 
 @pytest.fixture
