@@ -6,6 +6,7 @@ serialised once, which costs a tenth of building and serialising it anew.
 
 from __future__ import annotations
 
+import math
 import struct
 from functools import cache
 from importlib import import_module
@@ -148,6 +149,10 @@ def reference_from_message(message: JointState) -> Reference:
     return Reference(from_time(message.header.stamp), message.position[0], velocity)
 
 
+# Numbers whose eight bytes do not turn up by chance, not even across padding, which holds arbitrary bytes.
+_MARKS = (math.pi, math.e, math.sqrt(2.0), math.sqrt(3.0), math.log(2.0))
+
+
 class _Template:
     """A serialised message in which the stamp and some numbers are overwritten in place."""
 
@@ -180,8 +185,9 @@ class StateEncoder:
     """Serialised `state` messages, equal in content to those of `state_to_message`."""
 
     def __init__(self) -> None:
-        marked = PlantSample(0, position=1.25, velocity=2.25, force=3.25, drive=4.25, spool=5.25)
-        self._template = _Template(state_to_message(marked), (1.25, 5.25), (2.25,), (3.25, 4.25))
+        x, v, force, drive, spool = _MARKS
+        marked = PlantSample(0, position=x, velocity=v, force=force, drive=drive, spool=spool)
+        self._template = _Template(state_to_message(marked), (x, spool), (v,), (force, drive))
 
     def __call__(self, sample: PlantSample) -> bytes:
         """CDR bytes for `Publisher.publish`."""
@@ -193,7 +199,7 @@ class CommandEncoder:
     """Serialised `command` messages of one source, equal in content to those of `command_to_message`."""
 
     def __init__(self, source: str) -> None:
-        self._template = _Template(command_to_message(Command(0, source, 1.25)), (1.25,))
+        self._template = _Template(command_to_message(Command(0, source, _MARKS[0])), _MARKS[:1])
 
     def __call__(self, stamp_ns: int, drive: float) -> bytes:
         """CDR bytes for `Publisher.publish`."""
@@ -204,7 +210,7 @@ class PressureEncoder:
     """Serialised pressure messages, equal in content to those of `pressure_to_message`."""
 
     def __init__(self) -> None:
-        self._template = _Template(pressure_to_message(0, 1.25), (1.25,))
+        self._template = _Template(pressure_to_message(0, _MARKS[0]), _MARKS[:1])
 
     def __call__(self, stamp_ns: int, pressure: float) -> bytes:
         """CDR bytes for `Publisher.publish`."""
