@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Mapping
 
-from . import virtualenv, workspace
+from . import environment_plan, virtualenv, workspace
 from .checkout import Checkout
 from .environment import build_variables, command_variables
 from .lock import exclusive
@@ -38,13 +38,13 @@ class Bench:
         need = self.needed_environment()
         if (
             not rebuild
-            and virtualenv.current(self.checkout, need).action == "keep"
+            and environment_plan.current(self.checkout, need).action == "keep"
             and not self._state(need).stale()
         ):
             return 0
         start = time.monotonic()
         with exclusive(self.checkout.logs / "lock") as lock:
-            todo = virtualenv.current(self.checkout, need)  # another ./bench may have done it meanwhile
+            todo = environment_plan.current(self.checkout, need)  # another ./bench may have done it meanwhile
             if todo.action != "keep":
                 virtualenv.carry_out(todo, need, self.checkout, self.ros, self.environ, lock)
             state = self._state(need)
@@ -56,18 +56,18 @@ class Bench:
             print(f"Set up in {time.monotonic() - start:.0f} s.", file=sys.stderr, flush=True)
         return len(packages)
 
-    def needed_environment(self) -> virtualenv.Stamp:
+    def needed_environment(self) -> environment_plan.Stamp:
         """The virtual environment this call needs.
 
         :raises BenchError: the sourced ROS 2 needs a Python that is not there
         """
-        return virtualenv.wanted(self.checkout, self.ros, named=bool(self.environ.get("BENCH_PYTHON")))
+        return environment_plan.wanted(self.checkout, self.ros, named=bool(self.environ.get("BENCH_PYTHON")))
 
     def stale_packages(self) -> dict[str, str]:
         """Packages that have to be built, each with the reason."""
         return self._state(self.needed_environment()).stale()
 
-    def _state(self, need: virtualenv.Stamp) -> workspace.Build:
+    def _state(self, need: environment_plan.Stamp) -> workspace.Build:
         return workspace.Build(self.checkout, key=f"Python {need.python}, {need.ros}, {need.root}")
 
     def replace_process(self, command: list[str], variables: Mapping[str, str] | None = None) -> int:

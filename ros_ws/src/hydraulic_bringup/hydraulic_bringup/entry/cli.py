@@ -62,9 +62,7 @@ def main(arguments: list[str]) -> int:
         print("\nbench: stopped.", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        os.dup2(
-            os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
-        )  # the reader of a pipe left: nothing to say
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader of a pipe left: nothing to say
         return 0
     except Exception as error:
         print(f"bench: unexpected {type(error).__name__}: {error}\n  see: {_keep(checkout)}", file=sys.stderr)
@@ -77,9 +75,7 @@ def _run(bench: Bench, arguments: list[str]) -> int:
         return 0
     name, *rest = arguments
     if name not in verb_names():
-        raise UsageError(
-            f"There is no verb {name!r}.", remedy=f"use one of {', '.join(verb_names())}; ./bench --help"
-        )
+        raise UsageError(f"There is no verb {name!r}.", remedy=f"use one of {', '.join(verb_names())}; ./bench --help")
     return load(name).run(bench, rest)
 
 

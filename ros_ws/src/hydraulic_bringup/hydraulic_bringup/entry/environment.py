@@ -20,9 +20,7 @@ def command_variables(checkout: Checkout, ros: Ros, environ: Mapping[str, str]) 
     result.pop("PYTHONHOME", None)
     result["VIRTUAL_ENV"] = str(checkout.venv)
     result["PATH"] = joined([checkout.venv / "bin"], environ.get("PATH", os.defpath))
-    installed = [
-        checkout.install / name for name in checkout.packages() if (checkout.install / name).is_dir()
-    ]
+    installed = [checkout.install / name for name in checkout.packages() if (checkout.install / name).is_dir()]
     underlay = [] if ros.prefix else [checkout.venv]
     result["AMENT_PREFIX_PATH"] = joined([*installed, *underlay], environ.get("AMENT_PREFIX_PATH", ""))
     modules = [p for prefix in installed for p in sorted(prefix.glob("lib/python3*/site-packages"))]
@@ -37,9 +35,7 @@ def build_variables(checkout: Checkout, ros: Ros, environ: Mapping[str, str]) ->
     """`environ` for colcon: neither the packages to be built nor the wheels count as an underlay."""
     result = command_variables(checkout, ros, environ)
     for name in ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH", "PYTHONPATH"):
-        parts = [
-            p for p in environ.get(name, "").split(os.pathsep) if p and checkout.root not in Path(p).parents
-        ]
+        parts = [p for p in environ.get(name, "").split(os.pathsep) if p and checkout.root not in Path(p).parents]
         result[name] = os.pathsep.join(parts) if ros.prefix else ""
     return {name: value for name, value in result.items() if value}
 

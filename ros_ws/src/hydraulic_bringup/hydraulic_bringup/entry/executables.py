@@ -33,9 +33,7 @@ def find(prefixes: list[Path], package: str, executable: str) -> Path:
     known = executables(prefixes)
     if package not in known:
         offered = [name for name, files in known.items() if files]  # those of the workspace come first
-        raise UsageError(
-            f"There is no package {package!r}.", remedy=f"packages with executables: {_listed(offered)}"
-        )
+        raise UsageError(f"There is no package {package!r}.", remedy=f"packages with executables: {_listed(offered)}")
     if executable not in known[package]:
         raise UsageError(
             f"There is no executable {executable!r} in {package}.",

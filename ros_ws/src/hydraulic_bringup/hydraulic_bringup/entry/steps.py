@@ -105,16 +105,14 @@ def run_step(
 def telling_lines(output: list[str]) -> list[str]:
     """The lines of a failed command's output that say why.
 
-    Those pip marks as errors, with the last reason for trying again; else the end of the first traceback, with colcon's line about the package; else
-    the last ones.
+    Those pip marks as errors, with its last reason for trying again; else the end of the first traceback,
+    with colcon's line about the package; else the last ones.
     """
     lines = [line[:300] for line in output if line.strip()]
     told = [line for line in lines if line.startswith("ERROR")]
     told[:0] = [line for line in lines if line.startswith("WARNING: Retrying")][-1:]
     if not told:
-        raised = next(
-            (n for n, line in enumerate(lines) if re.match(r"[\w.]+(Error|Exception)\b", line)), None
-        )
+        raised = next((n for n, line in enumerate(lines) if re.match(r"[\w.]+(Error|Exception)\b", line)), None)
         if raised is not None:
             told = [line for line in lines if re.match(r"Failed\s+<<<", line)]
             told += lines[max(0, raised - 5) : raised + 1]

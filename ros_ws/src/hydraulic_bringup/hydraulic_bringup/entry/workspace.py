@@ -74,11 +74,7 @@ class Build:
         try:
             manifest = self.checkout.install / name / "share" / name / "package.xml"
             outcome = self.checkout.workspace / "build" / name / "colcon_build.rc"
-            return (
-                f"{outcome.stat().st_mtime_ns}"
-                if manifest.is_file() and outcome.read_text().strip() == "0"
-                else ""
-            )
+            return f"{outcome.stat().st_mtime_ns}" if manifest.is_file() and outcome.read_text().strip() == "0" else ""
         except OSError:
             return ""
 

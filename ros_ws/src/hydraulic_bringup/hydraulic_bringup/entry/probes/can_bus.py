@@ -67,6 +67,4 @@ def _python_can(bench: Bench) -> Finding:
 def _tools() -> Finding:
     if shutil.which("candump"):
         return Finding("can-utils", "found")
-    return Finding(
-        "can-utils", "not there (candump, cansend: only to look at a bus)", "apt install can-utils", NOTE
-    )
+    return Finding("can-utils", "not there (candump, cansend: only to look at a bus)", "apt install can-utils", NOTE)

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from importlib.metadata import distributions
 
-from .. import virtualenv
+from .. import environment_plan, virtualenv
 from ..bench import Bench
 from ..errors import BenchError
 from ..findings import MISSING, NOTE, Finding
@@ -26,14 +26,14 @@ def probe(bench: Bench) -> list[Finding]:
         need = bench.needed_environment()
     except BenchError as error:
         return [Finding("interpreter", error.what, error.remedy, MISSING)]
-    todo = virtualenv.current(bench.checkout, need)
+    todo = environment_plan.current(bench.checkout, need)
     findings = [_interpreter(need), _environment(bench, need, todo)]
     if todo.action in ("keep", "install"):
         findings += [_packages(bench), _starts(bench)]
     return [*findings, _disk(bench, todo), *_caches(bench)]
 
 
-def _interpreter(need: virtualenv.Stamp) -> Finding:
+def _interpreter(need: environment_plan.Stamp) -> Finding:
     probe_modules = [
         need.base,
         "-ES",
@@ -47,7 +47,7 @@ def _interpreter(need: virtualenv.Stamp) -> Finding:
     return Finding("interpreter", f"{answer.stdout.strip()}, {need.base}")
 
 
-def _environment(bench: Bench, need: virtualenv.Stamp, todo: virtualenv.Plan) -> Finding:
+def _environment(bench: Bench, need: environment_plan.Stamp, todo: environment_plan.Plan) -> Finding:
     if todo.action == "keep":
         return Finding("environment", f"{bench.checkout.venv}, with {need.ros}")
     reason = todo.reason or "not made yet"
@@ -73,7 +73,7 @@ def _starts(bench: Bench) -> Finding:
     return Finding("imports", last, "rm -rf .venv, then ./bench build", MISSING)
 
 
-def _disk(bench: Bench, todo: virtualenv.Plan) -> Finding:
+def _disk(bench: Bench, todo: environment_plan.Plan) -> Finding:
     free = shutil.disk_usage(bench.checkout.root).free / 1e9
     if todo.action in ("keep", "install"):
         return Finding("disk", f"{free:.1f} GB free")
@@ -92,8 +92,4 @@ def _caches(bench: Bench) -> list[Finding]:
     if os.access(place, os.W_OK):
         state = "filled" if os.path.isdir(chosen) and os.listdir(chosen) else "empty: the first run compiles"
         return [Finding("numba cache", f"{chosen} ({state})")]
-    return [
-        Finding(
-            "numba cache", f"{chosen} cannot be written", "set HYDRAULIC_SIM_CACHE to a folder of yours", NOTE
-        )
-    ]
+    return [Finding("numba cache", f"{chosen} cannot be written", "set HYDRAULIC_SIM_CACHE to a folder of yours", NOTE)]

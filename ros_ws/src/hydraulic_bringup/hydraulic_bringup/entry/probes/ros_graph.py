@@ -27,9 +27,7 @@ def _flavour(bench: Bench) -> Finding:
         return Finding("ROS 2", f"Jazzy, sourced from {bench.ros.prefix}")
     stock = Path("/opt/ros", DISTRO, "setup.sh")
     if stock.exists():
-        return Finding(
-            "ROS 2", f"{stock.parent} is there but not sourced: the wheels are used", f". {stock}", NOTE
-        )
+        return Finding("ROS 2", f"{stock.parent} is there but not sourced: the wheels are used", f". {stock}", NOTE)
     wheels = sorted(bench.checkout.venv.glob("lib/python3*/site-packages/ros_jazzy_rclpy-*.dist-info"))
     version = wheels[0].name.split("-")[1].removesuffix(".dist") if wheels else "not installed yet"
     return Finding("ROS 2", f"Jazzy wheels in .venv (rclpy {version}); no ROS 2 is sourced")
@@ -70,14 +68,10 @@ def _discovery(bench: Bench) -> list[Finding]:
         if wide
         else ""
     )
-    found = [
-        Finding("discovery", f"range {given or 'LOCALHOST'}, domain {domain}", remedy, NOTE if wide else "ok")
-    ]
+    found = [Finding("discovery", f"range {given or 'LOCALHOST'}, domain {domain}", remedy, NOTE if wide else "ok")]
     chosen = bench.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     if not bench.ros.prefix and chosen != "rmw_fastrtps_cpp":
-        found.append(
-            Finding("middleware", f"{chosen} is not among the wheels: rmw_fastrtps_cpp is used", state=NOTE)
-        )
+        found.append(Finding("middleware", f"{chosen} is not among the wheels: rmw_fastrtps_cpp is used", state=NOTE))
     else:
         found.append(Finding("middleware", chosen))
     return found

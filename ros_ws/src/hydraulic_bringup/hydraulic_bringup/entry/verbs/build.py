@@ -14,11 +14,7 @@ def run(bench: Bench, arguments: list[str]) -> int:
         print(f"usage: ./bench {__doc__}")
         return 0
     if set(arguments) - {"--all"}:
-        raise UsageError(
-            f"./bench build does not know {' '.join(arguments)}.", remedy="./bench build [--all]"
-        )
+        raise UsageError(f"./bench build does not know {' '.join(arguments)}.", remedy="./bench build [--all]")
     built = bench.prepare(rebuild="--all" in arguments)
-    print(
-        f"{built} packages built." if built else "Nothing to build: environment and workspace are up to date."
-    )
+    print(f"{built} packages built." if built else "Nothing to build: environment and workspace are up to date.")
     return 0

@@ -32,7 +32,5 @@ def run(bench: Bench, arguments: list[str]) -> int:
             print("\n".join(finding.lines()), flush=True)
             missing += [finding] if finding.state == MISSING else []
     print()
-    print(
-        f"The bench cannot run: {', '.join(f.subject for f in missing)}." if missing else "The bench can run."
-    )
+    print(f"The bench cannot run: {', '.join(f.subject for f in missing)}." if missing else "The bench can run.")
     return 1 if missing else 0

@@ -23,9 +23,7 @@ def run(bench: Bench, arguments: list[str]) -> int:
     prefixes = ros.prefixes(variables)
     if len(arguments) < 2:
         own = {
-            name: sorted(files)
-            for name, files in executables(prefixes).items()
-            if name in bench.checkout.packages()
+            name: sorted(files) for name, files in executables(prefixes).items() if name in bench.checkout.packages()
         }
         offered = "\n".join(f"{name}: {', '.join(files)}" for name, files in own.items() if files)
         raise UsageError("usage: ./bench run PKG EXE [ARG …]", remedy=offered)

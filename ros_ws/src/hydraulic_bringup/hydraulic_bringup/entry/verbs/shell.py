@@ -45,9 +45,7 @@ def _command(arguments: list[str]) -> list[str] | None:
         return arguments
     if arguments[0] == "--" and len(arguments) >= 2:
         return arguments[1:]
-    raise UsageError(
-        f"./bench shell does not know {' '.join(arguments)}.", remedy="./bench shell [-c CMD | -- CMD …]"
-    )
+    raise UsageError(f"./bench shell does not know {' '.join(arguments)}.", remedy="./bench shell [-c CMD | -- CMD …]")
 
 
 def _start_file(bench: Bench, shell: str, variables: dict[str, str]) -> list[str]:

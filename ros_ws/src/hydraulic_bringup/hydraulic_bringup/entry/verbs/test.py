@@ -50,9 +50,7 @@ def _pytest(command: list[str], bench: Bench, variables: Mapping[str, str]) -> t
     tail = ""
     root = bench.checkout.root
     here = Path.cwd() if root in Path.cwd().parents else root  # so that given paths mean what they say
-    with subprocess.Popen(
-        [*command, *colour], cwd=here, env={**variables, **size}, stdout=subprocess.PIPE
-    ) as process:
+    with subprocess.Popen([*command, *colour], cwd=here, env={**variables, **size}, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         try:
             while chunk := os.read(process.stdout.fileno(), 65536):
