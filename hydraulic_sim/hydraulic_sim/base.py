@@ -15,8 +15,10 @@ DATASHEET = "data sheet of the actuator or valve"
 
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter("moving_mass", "kg", 500.0, (1e-3, 1e6), "piston, rod and rigid load", DATASHEET, required=True),
-    Parameter("piston_area_a", "m^2", 1e-3, (1e-7, 10.0), "area that p_A acts on", DATASHEET, free=False, required=True),
-    Parameter("piston_area_b", "m^2", 1e-3, (1e-7, 10.0), "area that p_B acts on", DATASHEET, free=False, required=True),
+    Parameter("piston_area_a", "m^2", 1e-3, (1e-7, 10.0), "area that p_A acts on", DATASHEET,
+              free=False, required=True),
+    Parameter("piston_area_b", "m^2", 1e-3, (1e-7, 10.0), "area that p_B acts on", DATASHEET,
+              free=False, required=True),
     Parameter("stroke", "m", 1.0, (1e-4, 100.0), "travel between the stops; position 0 is its middle", DATASHEET,
               free=False, required=True),
     Parameter("dead_volume_a", "m^3", 1e-4, (1e-9, 1.0), "oil of side A with the piston at its stop, lines included",
@@ -24,7 +26,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("dead_volume_b", "m^3", 1e-4, (1e-9, 1.0), "oil of side B with the piston at its stop, lines included",
               DATASHEET, free=False, required=True),
     Parameter("bulk_modulus", "Pa", 1.5e9, (1e7, 4e9), "effective bulk modulus of the oil without air",
-              MERRITT + ", sec. 2-3"),
+              MERRITT + ", ch. 2"),
     Parameter("supply_pressure", "Pa", 14e6, (1e4, 1e8), "pressure at the valve's supply port", DATASHEET, free=False,
               required=True),
     Parameter("tank_pressure", "Pa", 0.0, (0.0, 1e7), "pressure at the valve's return port", DATASHEET, free=False),
@@ -39,7 +41,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("spool_travel", "m", 5e-4, (1e-6, 0.1), "spool displacement at full opening (reported, not felt)",
               DATASHEET, free=False),
     Parameter("orifice_transition", "Pa", 1e4, (1.0, 1e6), "drop below which orifice flow turns laminar",
-              MERRITT + ", sec. 3-4", free=False),
+              MERRITT + ", ch. 3", free=False),
     Parameter("drive_force", "N/V", 0.0, (-1e6, 1e6), "force per volt of a mechanical plant (without hydraulics)",
               "motor and amplifier data sheets", free=False),
 )  # fmt: skip

@@ -1,16 +1,16 @@
 """Model files: YAML with units, sources and a history; read with the place of every error, saved with comments kept.
 
-    format: hydraulic-model-1
-    name: my_bench
-    plant: hydraulic                      # or mechanical
-    parameters:
-      piston_area_a: {value: 12.5 in^2, source: data sheet}
-      moving_mass: 500 kg                 # the short form
-    effects:
-      coulomb_friction: {level: {value: 450 N, fit: free, bounds: [0 N, 2000 N]}}
-      spool_dynamics: {}                  # on, with the library's defaults
-    user_effects: [my_effect.py]          # relative to this file
-    history: []
+format: hydraulic-model-1
+name: my_bench
+plant: hydraulic                      # or mechanical
+parameters:
+  piston_area_a: {value: 12.5 in^2, source: data sheet}
+  moving_mass: 500 kg                 # the short form
+effects:
+  coulomb_friction: {level: {value: 450 N, fit: free, bounds: [0 N, 2000 N]}}
+  spool_dynamics: {}                  # on, with the library's defaults
+user_effects: [my_effect.py]          # relative to this file
+history: []
 """
 
 from __future__ import annotations

@@ -3,76 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import base
 from .compiled import compiled
 from .errors import SimulationError
 from .model import Model
 from .registry import library
-
-Array = NDArray[np.float64]
+from .trajectory import Array, PlantState, PlantValues, Trajectory
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 STEP_TIMES_RATE = 0.6  # how much of the fastest stated rate one step may cover
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """A simulated record; every array is (N,), sample k being the state at ``time[k]``, just as the drive changes.
-
-    ``position`` [m], ``pressure_a``, ``pressure_b`` [Pa] are what the sensors say, the ``true_`` ones the states;
-    ``velocity`` [m/s], ``pressure_supply`` [Pa], ``spool`` and ``opening`` (−1…1), ``force`` [N] from the pressures
-    read, ``drive`` [V] as applied. ``final`` is the state after the last sample, to go on from.
-    """
-
-    time: Array
-    drive: Array
-    position: Array
-    velocity: Array
-    pressure_a: Array
-    pressure_b: Array
-    pressure_supply: Array
-    spool: Array
-    opening: Array
-    force: Array
-    true_position: Array
-    true_pressure_a: Array
-    true_pressure_b: Array
-    final: PlantState
-
-    def __getitem__(self, channel: str) -> Array:
-        return getattr(self, channel)
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-
-@dataclass(frozen=True)
-class PlantState:
-    """States (n_states,), the effects' memories (n_memory,) and the time [s] since the start."""
-
-    states: Array
-    memory: Array
-    time: float = 0.0
-
-
-class PlantValues(NamedTuple):
-    """One live sample: what the sensors say [m, m/s, Pa, Pa, Pa, -, N, V]."""
-
-    position: float
-    velocity: float
-    pressure_a: float
-    pressure_b: float
-    pressure_supply: float
-    spool: float
-    force: float
-    drive: float
 
 
 class Plant:
@@ -135,7 +79,7 @@ class Plant:
         """A state to start from; pressures left out are those of rest.
 
         At rest the force on the piston vanishes: p_A·A_A = p_B·A_B + load; both at half the supply for equal areas
-        (a critical-centre valve, Merritt 1967, sec. 5-2).
+        (a critical-centre valve, Merritt 1967, ch. 5).
         """
         x = np.zeros(len(self.layout.states))
         command = max(-1.0, min(1.0, drive / self.value("drive_limit")))
@@ -175,9 +119,11 @@ class Plant:
         self._advance(u, dt, begin.time, x, memory, out)
         columns = {name: out[:, i] for i, name in enumerate(base.OUTPUTS)}
         limit = self.value("drive_limit")
-        force = columns["pressure_a"] * self.value("piston_area_a") - columns["pressure_b"] * self.value("piston_area_b")
+        force = columns["pressure_a"] * self.value("piston_area_a") - columns["pressure_b"] * self.value(
+            "piston_area_b"
+        )
         return Trajectory(
-            time=begin.time + dt * np.arange(len(u)),
+            time=begin.time + dt * np.arange(len(u), dtype=np.float64),
             drive=np.clip(u, -limit, limit),
             force=force,
             final=PlantState(x, memory, begin.time + dt * len(u)),
@@ -197,7 +143,9 @@ class Plant:
         first = np.ascontiguousarray(starts, dtype=np.int64)
         states = np.ascontiguousarray(initial_states, dtype=np.float64)
         if len(first) and (first.min() < 0 or first.max() + horizon >= len(u)):
-            raise SimulationError(f"starts {first.min()}…{first.max()} and a horizon of {horizon} leave the {len(u)} samples")
+            raise SimulationError(
+                f"starts {first.min()}…{first.max()} and a horizon of {horizon} leave the {len(u)} samples"
+            )
         if states.shape != (len(first), len(self.layout.states)):
             raise SimulationError(
                 f"initial_states has the shape {states.shape}; expected {(len(first), len(self.layout.states))}"
@@ -218,7 +166,17 @@ class Plant:
     def _advance(self, u: Array, dt: float, start: float, x: Array, memory: Array, out: Array) -> None:
         failure = np.zeros(2)
         done = self._compiled.run(
-            u, dt, start, self.longest_step, self._on, self._parameters, self._hydraulic, x, memory, out, failure
+            u,
+            dt,
+            start,
+            self.longest_step,
+            self._on,
+            self._parameters,
+            self._hydraulic,
+            x,
+            memory,
+            out,
+            failure,
         )
         if done < len(u):
             where = ", ".join(f"{name}={value:.6g}" for name, value in zip(self.layout.states, x, strict=True))
@@ -228,8 +186,8 @@ class Plant:
                 else f"the physics is too stiff: more than {failure[1]:.0f} substeps in one sample"
             )
             raise SimulationError(
-                f"{why} at t = {failure[0]:.6g} s (sample {done}); drive {u[done]:.6g} V, before it {u[max(done - 1, 0)]:.6g} V; "
-                f"state: {where}"
+                f"{why} at t = {failure[0]:.6g} s (sample {done}); drive {u[done]:.6g} V, "
+                f"before it {u[max(done - 1, 0)]:.6g} V; state: {where}"
             )
 
     def derivative(self, state: Array, drive: float, time: float = 0.0) -> tuple[Array, dict[str, float]]:
@@ -307,4 +265,4 @@ class LivePlant:
     @property
     def state(self) -> PlantState:
         """A copy of the present state."""
-        return replace(PlantState(self._state.copy(), self._memory.copy(), self._time))
+        return PlantState(self._state.copy(), self._memory.copy(), self._time)

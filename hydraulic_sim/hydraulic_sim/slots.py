@@ -71,6 +71,7 @@ SIGNALS: dict[str, tuple[int, str]] = {
     "flow_tank": (_ORDER["flow"], "flow returned to the tank [m³/s]"),
     "volume_a": (_ORDER["compliance"], "oil volume of chamber A [m³]"),
     "volume_b": (_ORDER["compliance"], "oil volume of chamber B [m³]"),
+    "acceleration": (len(SLOTS), "piston acceleration [m/s²]"),
     "direction": (_ORDER["force"], "direction of dry friction, −1…1 [-]"),
 }
 STATE_SIGNALS = ("t", "position", "velocity", "pressure_a", "pressure_b", "load_pressure")

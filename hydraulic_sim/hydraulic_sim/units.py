@@ -27,7 +27,11 @@ def to_si(value: float | int | str, unit: str, where: str = "value") -> float:
     if isinstance(value, str):
         try:
             quantity = _registry().Quantity(value)
-            number = float(quantity.to(unit).magnitude) if not quantity.unitless or unit == "1" else float(quantity.magnitude)
+            number = (
+                float(quantity.to(unit).magnitude)
+                if not quantity.unitless or unit == "1"
+                else float(quantity.magnitude)
+            )
         except pint.DimensionalityError as error:
             raise ModelError(f"{where}: {value!r} is in {error.units1}, which does not convert to {unit}") from None
         except Exception:

@@ -5,7 +5,7 @@
 z follows the sign of the velocity within a few micrometres of sliding (dz/dt = |v|/δ·(sign v − z), Dahl), so that
 the force is continuous and a piston at rest does not creep; `presliding` gives δ a physical size.
 
-Source: Merritt (1967), Hydraulic Control Systems, sec. 6-2; Dahl (1968), A solid friction model.
+Source: Merritt (1967), Hydraulic Control Systems, ch. 6; Dahl (1968), A solid friction model.
 """
 
 from hydraulic_sim.base import BRISTLE_LENGTH, BRISTLE_TIME
@@ -21,14 +21,23 @@ EFFECT = Effect(
     summary="dry friction of constant size",
     kernel=force,
     parameters=(
-        Parameter("level", "N", 450.0, (0.0, 1e5), "friction force Fc while sliding",
-                  "Nisar & Munawar, table of parameters", null=0.0),
+        Parameter(
+            "level",
+            "N",
+            450.0,
+            (0.0, 1e5),
+            "friction force Fc while sliding",
+            "Nisar & Munawar, table of parameters",
+            null=0.0,
+        ),
     ),
     equation="F = -Fc*sign(v), regularised over micrometres",
-    source="Merritt (1967), Hydraulic Control Systems, sec. 6-2; Dahl (1968)",
+    source="Merritt (1967), Hydraulic Control Systems, ch. 6; Dahl (1968)",
     excited_by="slow triangle through standstill: the load pressure builds up while the piston sticks",
     confused_with=("valve_deadband", "backlash"),
     told_apart_by="slow triangle: load pressure builds up while stuck",
-    step_rate=lambda p: max((p["level"] / (BRISTLE_LENGTH * p["moving_mass"])) ** 0.5,
-                            p["level"] * BRISTLE_TIME / (BRISTLE_LENGTH * p["moving_mass"])),
-)  # fmt: skip
+    step_rate=lambda p: max(
+        (p["level"] / (BRISTLE_LENGTH * p["moving_mass"])) ** 0.5,
+        p["level"] * BRISTLE_TIME / (BRISTLE_LENGTH * p["moving_mass"]),
+    ),
+)

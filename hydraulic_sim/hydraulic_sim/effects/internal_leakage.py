@@ -2,7 +2,7 @@
 
     q_A = −μ⁻¹·Ci·(p_A − p_B),   q_B = −q_A      (μ: the viscosity factor, 1 unless `viscosity_drift` is on)
 
-Source: Merritt (1967), Hydraulic Control Systems, sec. 6-1.
+Source: Merritt (1967), Hydraulic Control Systems, ch. 6.
 """
 
 from hydraulic_sim.effect import Effect, Parameter
@@ -18,12 +18,19 @@ EFFECT = Effect(
     summary="laminar flow past the piston",
     kernel=flow,
     parameters=(
-        Parameter("coefficient", "m^3/(s*Pa)", 5e-13, (0.0, 1e-9), "leakage coefficient Ci",
-                  "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: 1e-13 to 1e-11", null=0.0),
+        Parameter(
+            "coefficient",
+            "m^3/(s*Pa)",
+            5e-13,
+            (0.0, 1e-9),
+            "leakage coefficient Ci",
+            "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: 1e-13 to 1e-11",
+            null=0.0,
+        ),
     ),
     equation="q = Ci*(p_A - p_B)",
-    source="Merritt (1967), Hydraulic Control Systems, sec. 6-1",
+    source="Merritt (1967), Hydraulic Control Systems, ch. 6",
     excited_by="holding under load: the piston drifts in proportion to the load pressure",
     confused_with=("viscous_friction", "valve_underlap"),
     told_apart_by="flow balance, not force balance",
-)  # fmt: skip
+)

@@ -2,7 +2,7 @@
 
     F = −μ·b·v      (μ: the viscosity factor, 1 unless `viscosity_drift` is on)
 
-Source: Merritt (1967), Hydraulic Control Systems, sec. 6-2.
+Source: Merritt (1967), Hydraulic Control Systems, ch. 6.
 """
 
 from hydraulic_sim.effect import Effect, Parameter
@@ -17,13 +17,20 @@ EFFECT = Effect(
     summary="friction proportional to speed",
     kernel=force,
     parameters=(
-        Parameter("coefficient", "N*s/m", 164.0, (0.0, 1e6), "viscous friction coefficient b",
-                  "Nisar & Munawar, table of parameters: 64 and 100 N/(m/s) acting together", null=0.0),
+        Parameter(
+            "coefficient",
+            "N*s/m",
+            164.0,
+            (0.0, 1e6),
+            "viscous friction coefficient b",
+            "Nisar & Munawar, table of parameters: 64 and 100 N/(m/s) acting together",
+            null=0.0,
+        ),
     ),
     equation="F = -b*v",
-    source="Merritt (1967), Hydraulic Control Systems, sec. 6-2",
+    source="Merritt (1967), Hydraulic Control Systems, ch. 6",
     excited_by="fast strokes at steady speed",
     confused_with=("internal_leakage",),
     told_apart_by="force balance, not flow balance",
     step_rate=lambda p: p["coefficient"] / p["moving_mass"],
-)  # fmt: skip
+)

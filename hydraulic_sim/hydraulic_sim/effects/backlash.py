@@ -1,0 +1,72 @@
+"""Backlash: a gap between the rod and the load.
+
+    F = m·(ω²·c + 2·ζ·ω·ḋ) while in contact, never pulling back through the gap;   d̈ = −F/m − a
+
+d: how far the load is ahead of the rod; c = d ∓ g/2 beyond the gap g, 0 within it; ω = 2π·f of the contact. The mass m
+comes on top of moving_mass; without it (m = 0) nothing is felt.
+
+Source: Nordin & Gutman (2002), Automatica 38(10), dead-zone model of backlash.
+"""
+
+import math
+
+from numba import njit
+
+from hydraulic_sim.effect import Effect, Parameter, State
+
+
+@njit(error_model="numpy")
+def contact(lead, lead_rate, gap, frequency, damping):
+    """Acceleration of the rod's pull on the load [m/s²], against the load's lead."""
+    w = 2.0 * math.pi * frequency
+    if lead > 0.5 * gap:
+        return max(w * w * (lead - 0.5 * gap) + 2.0 * damping * w * lead_rate, 0.0)
+    if lead < -0.5 * gap:
+        return min(w * w * (lead + 0.5 * gap) + 2.0 * damping * w * lead_rate, 0.0)
+    return 0.0
+
+
+def force(lead, lead_rate, mass, gap, frequency, damping):
+    return mass * contact(lead, lead_rate, gap, frequency, damping)
+
+
+def dynamics(lead, lead_rate, acceleration, gap, frequency, damping):
+    return lead_rate, -contact(lead, lead_rate, gap, frequency, damping) - acceleration
+
+
+EFFECT = Effect(
+    slot="force",
+    summary="a gap between rod and load",
+    kernel=force,
+    dynamics=dynamics,
+    states=(State("lead", "m", scale=1e-3), State("lead_rate", "m/s", scale=0.1)),
+    parameters=(
+        Parameter(
+            "mass",
+            "kg",
+            200.0,
+            (0.0, 1e6),
+            "mass behind the gap, on top of moving_mass",
+            "part of the paper's load",
+            null=0.0,
+        ),
+        Parameter("gap", "m", 1e-3, (0.0, 0.05), "total width of the gap", "worn rod eyes: 0.1 to 2 mm"),
+        Parameter(
+            "frequency",
+            "Hz",
+            50.0,
+            (5.0, 300.0),
+            "natural frequency of the load on the contact, rod held",
+            "steel contact of a rod eye, softened by its bearing",
+        ),
+        Parameter("damping", "1", 0.1, (0.0, 2.0), "damping ratio in contact", "steel on steel with grease"),
+    ),
+    equation="F = m*(w^2*c + 2*zeta*w*d'), c = d -/+ g/2 beyond the gap",
+    source="Nordin & Gutman (2002), Automatica 38(10)",
+    excited_by="reversals, slow and fast",
+    confused_with=("valve_hysteresis", "valve_deadband", "presliding"),
+    told_apart_by="a width that does not depend on speed",
+    step_rate=lambda p: (
+        2.0 * math.pi * p["frequency"] * (1.0 + p["mass"] / p["moving_mass"]) ** 0.5 if p["mass"] > 0.0 else 0.0
+    ),
+)

@@ -1,0 +1,30 @@
+"""Sensor delay: the position arrives late.
+
+    y(t) = x(t − T)      (straight between samples)
+
+Source: Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4 (sensors and bus).
+"""
+
+from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sim.kernels import delayed
+
+
+def delay_reading(reading, memory, dt, delay):
+    return delayed(reading, delay, dt, memory)
+
+
+EFFECT = Effect(
+    slot="position_sensor",
+    summary="dead time of the position sensor",
+    kernel=delay_reading,
+    memory=258,
+    parameters=(
+        Parameter("delay", "s", 4e-3, (0.0, 0.05), "dead time T", "digital position sensors: 1 to 10 ms", null=0.0),
+    ),
+    equation="y(t) = x(t - T)",
+    source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",
+    excited_by="chirp and steps",
+    confused_with=("command_delay", "sensor_lag", "spool_dynamics"),
+    told_apart_by="the pressures lead the position, over frequency",
+    order=10,
+)
