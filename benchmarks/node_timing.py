@@ -65,10 +65,7 @@ def spin(node: rclpy.node.Node) -> None:
 def record() -> dict[str, object]:
     """Take all streams raw; per stream how many came and how many stamps are missing in between."""
     node = rclpy.create_node("timing_recorder", namespace="/actuator")
-    boxes = {
-        n: Mailbox(node, interface_class(find_topic(n).type), topic(n), profile(n, 5000), True)
-        for n in STREAMS
-    }
+    boxes = {n: Mailbox(node, interface_class(find_topic(n).type), topic(n), profile(n, 5000), True) for n in STREAMS}
     stamps: dict[str, list[int]] = {name: [] for name in STREAMS}
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
@@ -89,9 +86,7 @@ def gaps(stamps: dict[str, list[int]]) -> dict[str, int]:
 def control(answer: bool) -> dict[str, object]:
     """Answer every state with a command; delivery is from the state's stamp to here, in ms."""
     node = rclpy.create_node("timing_controller", namespace="/actuator")
-    publisher = node.create_publisher(
-        interface_class(find_topic("command").type), topic("command"), profile("command")
-    )
+    publisher = node.create_publisher(interface_class(find_topic("command").type), topic("command"), profile("command"))
     encode = CommandEncoder("timing")
     delays: list[float] = []
     count = [0]
@@ -114,12 +109,8 @@ def bare(seconds: float) -> dict[str, object]:
     """The plainest rclpy program: build and publish the messages, sleep until the next deadline."""
     node = rclpy.create_node("bare", namespace="/actuator")
     names = STREAMS[:4]
-    publishers = [
-        node.create_publisher(interface_class(find_topic(n).type), topic(n), profile(n)) for n in names
-    ]
-    while (
-        min(p.get_subscription_count() for p in publishers) < 1 or publishers[0].get_subscription_count() < 2
-    ):
+    publishers = [node.create_publisher(interface_class(find_topic(n).type), topic(n), profile(n)) for n in names]
+    while min(p.get_subscription_count() for p in publishers) < 1 or publishers[0].get_subscription_count() < 2:
         time.sleep(0.05)
     time.sleep(0.5)
     ticks: list[int] = []
@@ -213,22 +204,16 @@ def line(name: str, result: dict[str, object]) -> str:
     """One row of the table."""
     jitter, delivery, missing = result["jitter_ms"], result["delivery_ms"], result["gaps"]
     lost = sum(max(count, 0) for count in missing.values())
-    cells = [f"{jitter[key]:8.3f}" for key in ("p50", "p99", "max")] + [
-        f"{delivery[k]:8.3f}" for k in ("p50", "p99")
-    ]
+    cells = [f"{jitter[key]:8.3f}" for key in ("p50", "p99", "max")] + [f"{delivery[k]:8.3f}" for k in ("p50", "p99")]
     return f"{name:24s} {lost:6d} {' '.join(cells)}"
 
 
 def main() -> int:
     """Run the benchmark, or one of its roles."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--bare-seconds", type=float, default=20.0)
-    parser.add_argument(
-        "--plant", default="hydraulic_sim.nodes.simulator", help="module or script of the plant node"
-    )
+    parser.add_argument("--plant", default="hydraulic_sim.nodes.simulator", help="module or script of the plant node")
     parser.add_argument("--json", type=Path, help="write all figures to this file")
     parser.add_argument("--role", choices=("record", "control", "bare"), help=argparse.SUPPRESS)
     parser.add_argument("--answer", action="store_true", help=argparse.SUPPRESS)

@@ -252,9 +252,7 @@ class Source:
         from hydraulic_interfaces.samples import Command
 
         now = self._client.node.get_clock().now().nanoseconds
-        self._publisher.publish(
-            command_to_message(Command(now - round(self.age * 1e9), self._name, self.drive))
-        )
+        self._publisher.publish(command_to_message(Command(now - round(self.age * 1e9), self._name, self.drive)))
 
     def stop(self) -> None:
         """Fall silent."""

@@ -95,9 +95,7 @@ def test_lifecycle_round_trip(start: Any, client: Any, wait_until: Any) -> None:
 
 
 def test_samples_share_stamps_on_the_grid(start: Any, client: Any, wait_until: Any) -> None:
-    streams = {
-        name: client.collect(name) for name in ("state", "pressure_a", "pressure_b", "pressure_supply")
-    }
+    streams = {name: client.collect(name) for name in ("state", "pressure_a", "pressure_b", "pressure_supply")}
     start()
     wait_until(lambda: len(streams["state"]) > 500, "500 states")
     stamps = {name: [from_time(m.header.stamp) for m in list(heard)][:400] for name, heard in streams.items()}
@@ -240,15 +238,13 @@ def test_parameters_are_described_and_guarded(start: Any, client: Any, wait_unti
         "rcl_interfaces/srv/DescribeParameters", f"{PLANT}/describe_parameters", names=["rate", "watchdog"]
     )
     for row in answer.descriptors:
-        assert (
-            row.description and row.floating_point_range[0].to_value > row.floating_point_range[0].from_value
-        )
+        assert row.description and row.floating_point_range[0].to_value > row.floating_point_range[0].from_value
 
     def put(name: str, value: float) -> Any:
         change = Parameter(name=name, value=ParameterValue(type=3, double_value=value))
-        return client.call(
-            "rcl_interfaces/srv/SetParameters", f"{PLANT}/set_parameters", parameters=[change]
-        ).results[0]
+        return client.call("rcl_interfaces/srv/SetParameters", f"{PLANT}/set_parameters", parameters=[change]).results[
+            0
+        ]
 
     assert put("watchdog", 0.2).successful
     assert not put("watchdog", 1e9).successful

@@ -98,8 +98,8 @@ def test_a_stall_is_skipped_and_counted_by_a_plant_that_cannot(wait_until: Any) 
     loop, ports = run(Scripted(lambda k: time.sleep(0.02 if k == 50 else 0)), 200, wait_until)
     stamps = [s.stamp_ns for s in ports.samples]
     missing = sum((b - a) // PERIOD - 1 for a, b in zip(stamps, stamps[1:], strict=False))
-    assert missing >= 18
-    assert loop.monitor.report().skipped == missing
+    # Instants skipped before the first sample are counted as well, but leave no gap between two samples.
+    assert loop.monitor.report().skipped >= missing >= 18
     assert all((s - stamps[0]) % PERIOD == 0 for s in stamps)
 
 

@@ -60,28 +60,20 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic("pressure_a", _PRESSURE, "stream", "plant", "Pa, stamp of the state"),
     Topic("pressure_b", _PRESSURE, "stream", "plant", "Pa, stamp of the state"),
-    Topic(
-        "pressure_supply", _PRESSURE, "stream", "plant", "Pa, stamp of the state; NaN without a transducer"
-    ),
+    Topic("pressure_supply", _PRESSURE, "stream", "plant", "Pa, stamp of the state; NaN without a transducer"),
     Topic("limit_retracted", "std_msgs/msg/Bool", "latched", "plant", "limit switch at the retracted end"),
     Topic("limit_extended", "std_msgs/msg/Bool", "latched", "plant", "limit switch at the extended end"),
     Topic("reference", _JOINTS, "stream", "reference", "name [piston], position [m], velocity [m/s]"),
     Topic("predicted_state", _JOINTS, "stream", "estimator", "as state, from the model on the applied drive"),
     Topic("residual", _JOINTS, "stream", "estimator", "measured minus predicted, as state"),
-    Topic(
-        "experiment", "std_msgs/msg/String", "latched", "excitation", "JSON: started, finished or aborted run"
-    ),
+    Topic("experiment", "std_msgs/msg/String", "latched", "excitation", "JSON: started, finished or aborted run"),
     Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "diagnostics", "every node", "health"),
 )
 
 SERVICES: tuple[Service, ...] = (
     Service("enable", "std_srvs/srv/SetBool", "true: commands move the actuator; false: 0 V"),
-    Service(
-        "emergency_stop", "std_srvs/srv/Trigger", "0 V at once, latched until reset; works in every state"
-    ),
-    Service(
-        "reset", "std_srvs/srv/Trigger", "releases the latched stop; the actuator stays disabled until enable"
-    ),
+    Service("emergency_stop", "std_srvs/srv/Trigger", "0 V at once, latched until reset; works in every state"),
+    Service("reset", "std_srvs/srv/Trigger", "releases the latched stop; the actuator stays disabled until enable"),
 )
 
 QOS_CLASSES: tuple[str, ...] = ("stream", "latched", "diagnostics")

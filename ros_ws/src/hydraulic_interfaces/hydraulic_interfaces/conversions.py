@@ -77,9 +77,7 @@ def state_to_message(sample: PlantSample) -> JointState:
 
 def pressure_to_message(stamp_ns: int, pressure: float) -> FluidPressure:
     """The message of one pressure [Pa]."""
-    return FluidPressure(
-        header=Header(stamp=to_time(stamp_ns), frame_id=PLANT_FRAME), fluid_pressure=pressure
-    )
+    return FluidPressure(header=Header(stamp=to_time(stamp_ns), frame_id=PLANT_FRAME), fluid_pressure=pressure)
 
 
 def sample_to_messages(sample: PlantSample) -> tuple[JointState, FluidPressure, FluidPressure, FluidPressure]:
@@ -149,7 +147,7 @@ def reference_from_message(message: JointState) -> Reference:
     return Reference(from_time(message.header.stamp), message.position[0], velocity)
 
 
-# Numbers whose eight bytes do not turn up by chance, not even across padding, which holds arbitrary bytes.
+# Numbers whose eight bytes do not turn up by chance, not even with the arbitrary bytes that padding holds.
 _MARKS = (math.pi, math.e, math.sqrt(2.0), math.sqrt(3.0), math.log(2.0))
 
 
@@ -167,10 +165,9 @@ class _Template:
         self._fields = []
         for values in fields:
             form = struct.Struct(f"{order}{len(values)}d")
-            marker = form.pack(*values)
-            if self._buffer.count(marker) != 1:
-                raise ValueError(f"marker {values} is not unique in the serialised {type(message).__name__}")
-            self._fields.append((form, self._buffer.index(marker)))
+            # The first occurrence is the field: what the serialiser leaves unwritten before it is too short to
+            # hold another, while behind the last field there may be some, left over from an earlier message.
+            self._fields.append((form, self._buffer.index(form.pack(*values))))
 
     def fill(self, stamp_ns: int, *fields: tuple[float, ...]) -> bytes:
         """The message with this stamp and these numbers."""

@@ -53,9 +53,7 @@ class LoopTiming:
 
     def __post_init__(self) -> None:
         if self.factor != 1.0 and not self.own_clock:
-            raise ValueError(
-                f"real_time_factor is {self.factor:g}: only with publish_clock may it differ from 1"
-            )
+            raise ValueError(f"real_time_factor is {self.factor:g}: only with publish_clock may it differ from 1")
 
 
 class PlantLoop:
@@ -131,9 +129,8 @@ class PlantLoop:
             if self._timing.priority > 0:
                 self.scheduling = request_realtime(self._timing.priority)
             self._cycle(Pacer().wait)
-        except (
-            Exception
-        ) as error:  # whatever a backend throws, the drive must end at 0 V and somebody must hear
+        except Exception as error:
+            # Whatever a backend throws: the drive must end at 0 V, and somebody must hear of it.
             self.error = error
             self._gate.stop(f"plant loop failed: {error}")
         finally:

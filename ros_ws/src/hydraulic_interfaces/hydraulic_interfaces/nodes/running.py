@@ -32,9 +32,7 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     through the lifecycle's shutdown while everything still works, so the last thing the plant sees is 0 V.
     """
     arguments = sys.argv if argv is None else [sys.argv[0], *argv]
-    options = _parser(description, (*PARAMETERS, *backend.parameters())).parse_args(
-        remove_ros_args(arguments)[1:]
-    )
+    options = _parser(description, (*PARAMETERS, *backend.parameters())).parse_args(remove_ros_args(arguments)[1:])
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     overrides = [Parameter("autostart", value=True)] if options.autostart else []
     try:
