@@ -1,0 +1,171 @@
+"""What the plant node does when its backend does not do what it should; over real processes."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SCRIPT = Path(__file__).parent / "integrator_plant.py"
+PLANT = "/actuator/plant"
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Path:
+    return tmp_path / "journal.txt"
+
+
+@pytest.fixture
+def start(launch: Any, journal: Path) -> Callable[..., Any]:
+    def run(*ros: str, autostart: bool = True) -> Any:
+        options = ["--autostart"] if autostart else []
+        return launch(SCRIPT, *options, "--ros-args", "-p", f"journal:={journal}", "-p", "watchdog:=2.0", *ros)
+
+    return run
+
+
+def enable(client: Any, on: bool = True) -> Any:
+    return client.call("std_srvs/srv/SetBool", "/actuator/enable", data=on)
+
+
+def set_parameter(client: Any, name: str, value: float) -> Any:
+    from rcl_interfaces.msg import Parameter, ParameterValue
+
+    change = Parameter(name=name, value=ParameterValue(type=3, double_value=value))
+    return client.call("rcl_interfaces/srv/SetParameters", f"{PLANT}/set_parameters", parameters=[change]).results[0]
+
+
+def test_a_failed_configure_leaves_a_living_node(start: Any, client: Any, journal: Path) -> None:
+    process = start("-p", "trouble:=configure", autostart=False)
+    assert not client.change_state("configure")
+    assert client.state() == "unconfigured"
+    process.says("cannot configure: no plant behind this name")
+    assert journal.read_text().split() == ["configure", "cleanup"]
+
+
+def test_a_failed_activate_leaves_the_plant_inactive(start: Any, client: Any, journal: Path) -> None:
+    process = start("-p", "trouble:=activate", autostart=False)
+    assert client.change_state("configure")
+    assert not client.change_state("activate")
+    assert client.state() == "inactive"
+    process.says("cannot activate: the plant does not answer")
+    assert journal.read_text().splitlines()[-1].startswith("deactivate")
+
+
+def test_a_step_that_raises_ends_at_zero_volts_and_is_reported(
+    start: Any, client: Any, wait_until: Any, journal: Path
+) -> None:
+    process = start("-p", "trouble:=step")
+    health = client.diagnostics()
+    wait_until(lambda: client.state() == "active", "an active plant")
+    assert enable(client).success
+    client.source("hand", 1.0)
+    wait_until(lambda: client.state() == "unconfigured", "error processing")
+    wait_until(lambda: "integrator burst" in health["fault"] and health["plant level"] == "2", "the error reported")
+    process.says("the plant loop ended: ArithmeticError: integrator burst")
+    assert process.popen.poll() is None
+    lines = journal.read_text().splitlines()
+    assert "deactivate after 0.0 V" in lines and lines[-1] == "cleanup"
+    # It can be brought back, but moves only after reset and enable.
+    assert client.change_state("configure") and client.change_state("activate")
+    assert "call reset first" in enable(client).message
+    assert client.call("std_srvs/srv/Trigger", "/actuator/reset").success
+    assert enable(client, False).success
+
+
+def test_a_fault_of_the_plant_holds_zero_volts_until_reset(start: Any, client: Any, wait_until: Any) -> None:
+    start("-p", "trouble:=fault")
+    states, health = client.collect("state"), client.diagnostics()
+    wait_until(lambda: client.state() == "active", "an active plant")
+    assert enable(client).success
+    client.source("hand", 1.0)
+    wait_until(lambda: health["fault"] == "cable break", "the fault in the diagnostics")
+    wait_until(lambda: states[-1].effort[1] == 0.0, "0 V")
+    assert client.state() == "active"
+    assert not enable(client).success
+    assert client.call("std_srvs/srv/Trigger", "/actuator/reset").success
+    assert enable(client).success
+    wait_until(lambda: states[-1].effort[1] == 1.0, "the drive after reset and enable")
+
+
+def test_enable_on_activate(start: Any, client: Any, wait_until: Any, journal: Path) -> None:
+    start("-p", "enable_on_activate:=true")
+    states = client.collect("state")
+    client.source("hand", 1.0)
+    wait_until(lambda: states and states[-1].effort[1] == 1.0, "a drive without a call of enable")
+    assert "enabled True" in journal.read_text().splitlines()
+
+
+def test_the_backend_sees_zero_volts_last(start: Any, client: Any, wait_until: Any, journal: Path) -> None:
+    process = start("-p", "enable_on_activate:=true")
+    states = client.collect("state")
+    client.source("hand", 1.0)
+    wait_until(lambda: states and states[-1].effort[1] == 1.0, "the commanded drive")
+    process.interrupt(signal.SIGTERM)
+    assert process.wait() == 0, process.output()
+    lines = journal.read_text().splitlines()
+    assert [line for line in lines if line.startswith("deactivate")] == ["deactivate after 0.0 V"]
+    assert lines[-1] == "cleanup"
+
+
+def test_limit_switches_follow_the_piston(start: Any, client: Any, wait_until: Any) -> None:
+    start("-p", "enable_on_activate:=true", "-p", "model.gain:=1.0")
+    extended, retracted = client.collect("limit_extended"), client.collect("limit_retracted")
+    source = client.source("hand", 10.0)
+    wait_until(lambda: extended and extended[-1].data, "the extended limit switch")
+    source.drive = -10.0
+    wait_until(lambda: retracted and retracted[-1].data, "the retracted limit switch")
+    assert not extended[-1].data
+
+
+def test_parameters_known_after_configure(start: Any, client: Any, wait_until: Any, journal: Path) -> None:
+    start("-p", "model.gain:=0.5")
+    wait_until(lambda: client.state() == "active", "an active plant")
+    assert "set model.gain 0.5" in journal.read_text().splitlines()
+    assert set_parameter(client, "model.gain", 0.25).successful
+    wait_until(lambda: "set model.gain 0.25" in journal.read_text(), "the value in the backend")
+    refused = set_parameter(client, "model.gain", 2.0)
+    assert not refused.successful
+    answer = client.call("rcl_interfaces/srv/DescribeParameters", f"{PLANT}/describe_parameters", names=["model.gain"])
+    assert answer.descriptors[0].description == "velocity per drive [m/s/V]"
+    for transition in ("deactivate", "cleanup", "configure"):
+        assert client.change_state(transition)
+
+
+@pytest.mark.parametrize("bad", ["rate:=-5.0", "rate:=fast", "watchdog:=.nan", "realtime_priority:=200"])
+def test_a_bad_parameter_is_one_clear_line(start: Any, bad: str) -> None:
+    process = start("-p", bad)
+    assert process.wait() == 2
+    assert "Traceback" not in process.output()
+    assert bad.partition(":")[0] in process.output()
+
+
+def test_unknown_options_are_named(launch: Any) -> None:
+    process = launch(SCRIPT, "--autosart")
+    assert process.wait() == 2
+    assert "--autosart" in process.output()
+
+
+def test_clock_of_its_own(start: Any, client: Any, wait_until: Any) -> None:
+    import rclpy
+    from rosgraph_msgs.msg import Clock
+
+    from hydraulic_interfaces.conversions import from_time
+
+    client.node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
+    ticks: list[Any] = []
+    client.node.create_subscription(Clock, "/clock", ticks.append, 10)
+    states = client.collect("state")
+    start("-p", "publish_clock:=true", "-p", "real_time_factor:=0.5", "-p", "enable_on_activate:=true")
+    client.source("hand", 1.0)
+    wait_until(lambda: states and states[-1].effort[1] == 1.0, "a source on simulated time being obeyed")
+    assert abs(from_time(ticks[-1].clock) - from_time(states[-1].header.stamp)) < 1e9
+
+
+def test_a_factor_without_a_clock_is_refused(start: Any, client: Any) -> None:
+    process = start("-p", "real_time_factor:=2.0", autostart=False)
+    assert not client.change_state("configure")
+    process.says("real_time_factor is 2")
