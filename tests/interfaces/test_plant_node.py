@@ -111,6 +111,18 @@ def test_the_backend_sees_zero_volts_last(start: Any, client: Any, wait_until: A
     assert lines[-1] == "cleanup"
 
 
+def test_a_plant_that_cannot_be_deactivated_is_reported(start: Any, client: Any, wait_until: Any) -> None:
+    process = start("-p", "trouble:=deactivate")
+    wait_until(lambda: client.state() == "active", "an active plant")
+    assert not client.change_state("deactivate")
+    process.says("the plant loop ended: BackendError: the plant does not answer")
+    assert client.state() == "unconfigured"
+
+
+def test_a_misspelt_parameter_is_named(start: Any) -> None:
+    start("-p", "wachdog:=1.0").says("no parameter has the name 'wachdog'")
+
+
 def test_limit_switches_follow_the_piston(start: Any, client: Any, wait_until: Any) -> None:
     start("-p", "enable_on_activate:=true", "-p", "model.gain:=1.0")
     extended, retracted = client.collect("limit_extended"), client.collect("limit_retracted")

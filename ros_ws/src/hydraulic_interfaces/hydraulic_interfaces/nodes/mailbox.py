@@ -45,3 +45,18 @@ class Mailbox:
         with handle:
             while (taken := handle.take_message(kind, raw)) is not None:
                 yield taken[0]
+
+    def take_with_info(self) -> Iterator[tuple[Any, dict[str, int | None]]]:
+        """Every waiting message, oldest first, with the middleware's account of it.
+
+        Keys: `source_timestamp` and `received_timestamp` [ns since the epoch], `publication_sequence_number`.
+        """
+        handle, kind, raw = self._subscription.handle, self._subscription.msg_type, self._raw
+        with handle:
+            while (taken := handle.take_message(kind, raw)) is not None:
+                yield taken
+
+    @property
+    def publishers(self) -> int:
+        """Number of publishers that this subscription is connected with."""
+        return int(self._subscription.get_publisher_count())

@@ -70,6 +70,12 @@ class ParameterTable:
         """Values of all declared parameters by name."""
         return {name: self[name] for name in self._specs}
 
+    def warn_of_unknown(self) -> None:
+        """Log a warning for each value given at the start of the node that no declared parameter has taken."""
+        for name in self._node._parameter_overrides:
+            if not self._node.has_parameter(name):
+                self._node.get_logger().warning(f"no parameter has the name {name!r}: the value given is not used")
+
     def _check(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         for parameter in parameters:
             spec = self._specs.get(parameter.name)

@@ -101,6 +101,7 @@ class PlantNode(LifecycleNode):
             return FAILURE
         if self._timing.own_clock:
             self._ports.open_clock()
+        self._table.warn_of_unknown()
         self._state = "inactive"
         return SUCCESS
 
@@ -154,6 +155,8 @@ class PlantNode(LifecycleNode):
         if not loop.stop():
             self._complain("the plant loop hangs in its backend")
             return False
+        if loop.error is not None:
+            self._complain(f"the plant loop ended: {type(loop.error).__name__}: {loop.error}")
         self._last_stamp_ns = loop.last_stamp_ns
         self._state = "inactive"
         return loop.error is None
@@ -222,7 +225,6 @@ class PlantNode(LifecycleNode):
     def _watch(self) -> None:
         loop = self._loop
         if loop is not None and loop.error is not None:
-            self._complain(f"the plant loop ended: {type(loop.error).__name__}: {loop.error}")
             self.trigger_deactivate()
         urgent = self._health.urgent()
         if urgent != self._watched or self._watch_count % _REPORT_EVERY == 0:
