@@ -1,0 +1,22 @@
+"""``python -m hydraulic_sim VERB …``: the verbs of this package."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+
+from . import verbs
+
+
+def main() -> int:
+    """Hand over to a verb; without one, list them."""
+    names = sorted(m.name for m in pkgutil.iter_modules(verbs.__path__))
+    if len(sys.argv) > 1 and sys.argv[1] in names:
+        return importlib.import_module(f"{verbs.__name__}.{sys.argv[1]}").main(sys.argv[2:])
+    print(f"usage: python -m hydraulic_sim VERB …   verbs: {', '.join(names)}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

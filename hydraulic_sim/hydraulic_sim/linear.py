@@ -1,0 +1,160 @@
+"""Linearisation of the plant around an operating point, and the closed forms of the third-order model.
+
+    G(s) = K_v / ( s·(s²/ω² + 2·ζ·s/ω + 1) ),   K_v = K_q/A,   ω = A·√(4·β/(V_t·M))
+    ζ = (K_c + C_t)/A·√(β·M/V_t) + b/(4·A)·√(V_t/(β·M))
+
+Merritt (1967), Hydraulic Control Systems, ch. 6 (symmetric piston in mid stroke).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from scipy.optimize import least_squares
+
+from . import base
+from .effect import arguments
+from .errors import SimulationError
+from .model import Model
+from .plant import Plant
+from .trajectory import Array
+
+_FRACTION = 1e-5  # difference step, of a state's scale
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """Steady motion at a constant drive: position [m], drive [V], velocity [m/s], pressures [Pa]."""
+
+    position: float
+    drive: float
+    velocity: float
+    pressure_a: float
+    pressure_b: float
+    state: Array
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """The third-order model's constants: flow gain [m³/(s·V)], flow-pressure coefficient [m³/(s·Pa)], velocity gain
+    [m/(s·V)], natural frequency [rad/s] and damping ratio."""
+
+    flow_gain: float
+    flow_pressure: float
+    velocity_gain: float
+    natural_frequency: float
+    damping: float
+
+    def transfer_function(self) -> control.TransferFunction:
+        """Drive [V] to position [m]."""
+        w, z = self.natural_frequency, self.damping
+        return control.TransferFunction([self.velocity_gain], [1.0 / w**2, 2.0 * z / w, 1.0, 0.0])
+
+
+def linearise(model: Model, position: float = 0.0, drive: float = 0.0) -> control.StateSpace:
+    """State space from the drive [V] to (position [m], p_A [Pa], p_B [Pa]), by central differences.
+
+    Dry friction is left out: it has no linear part (its describing function depends on the amplitude). Effects that
+    act per sample (dead time, play, sensor lag) are not part of it either. States are named.
+    Raises `SimulationError` when no steady motion exists at that drive.
+    """
+    plant, active = _smooth_plant(model)
+    point = operating_point(model, position, drive)
+    names = list(active)
+    a = np.empty((len(names), len(names)))
+    for j, index in enumerate(active.values()):
+        h = _FRACTION * list(plant.layout.state_records.values())[index].scale
+        up, down = point.state.copy(), point.state.copy()
+        up[index] += h
+        down[index] -= h
+        difference = plant.derivative(up, drive)[0] - plant.derivative(down, drive)[0]
+        a[:, j] = difference[list(active.values())] / (2.0 * h)
+    h = 1e-4 * plant.value("drive_limit")
+    b = (plant.derivative(point.state, drive + h)[0] - plant.derivative(point.state, drive - h)[0])[
+        list(active.values())
+    ] / (2.0 * h)
+    outputs = [n for n in ("position", "pressure_a", "pressure_b") if n in names]
+    c = np.zeros((len(outputs), len(names)))
+    for i, name in enumerate(outputs):
+        c[i, names.index(name)] = 1.0
+    return control.ss(
+        a, b[:, None], c, np.zeros((len(outputs), 1)), states=names, inputs=["drive"], outputs=outputs, name=model.name
+    )
+
+
+def operating_point(model: Model, position: float = 0.0, drive: float = 0.0) -> OperatingPoint:
+    """The steady motion at a constant drive, dry friction left out. Raises `SimulationError` where there is none."""
+    plant, active = _smooth_plant(model)
+    start = plant.initial_state(position=position, drive=drive).states
+    moving = [i for name, i in active.items() if name != "position"]
+    scales = np.array([s.scale for s in plant.layout.state_records.values()])
+    rate = max(1.0, abs(plant.derivative(start, drive)[1]["pressure_rate"]))
+
+    def residual(scaled: Array) -> Array:
+        state = start.copy()
+        state[moving] = scaled * scales[moving]
+        return plant.derivative(state, drive)[0][moving] / scales[moving] / rate
+
+    found = least_squares(residual, start[moving] / scales[moving], xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    # At rest a closed valve holds any common pressure, so that the residual counts and not the solution's spread.
+    if not np.max(np.abs(found.fun)) < 1e-6:
+        raise SimulationError(
+            f"{model.name}: no steady motion at {drive:g} V and x = {position:g} m (residual {np.max(np.abs(found.fun)):.2g})"
+        )
+    state = start.copy()
+    state[moving] = found.x * scales[moving]
+    return OperatingPoint(position, drive, float(state[1]), float(state[2]), float(state[3]), state)
+
+
+def closed_form(model: Model) -> ClosedForm:
+    """The third-order model of a symmetric actuator around rest in mid stroke.
+
+    Flow gain of a critical-centre valve at no load, K_q = Q_r/√Δp_r·√((p_S − p_T)/2)/u_max; K_c from what the lands
+    leak when shut. Raises `SimulationError` for unequal piston areas.
+    """
+    area = model.value("piston_area_a")
+    if abs(area / model.value("piston_area_b") - 1.0) > 1e-3:
+        raise SimulationError(f"{model.name}: the closed form holds for equal piston areas (Merritt 1967, ch. 6)")
+
+    def on(effect: str, name: str) -> float:
+        return model.value(f"{effect}.{name}") if effect in model.effects else 0.0
+
+    half_drop = 0.5 * (model.value("supply_pressure") - model.value("tank_pressure"))
+    land = model.value("valve_flow") / math.sqrt(model.value("valve_drop"))
+    flow_gain = land * math.sqrt(half_drop) / model.value("drive_limit")
+    flow_pressure = land * model.value("valve_leakage") / (2.0 * math.sqrt(half_drop))
+    volume = area * model.value("stroke") + model.value("dead_volume_a") + model.value("dead_volume_b")
+    beta, mass = model.value("bulk_modulus"), model.value("moving_mass")
+    leak = flow_pressure + on("internal_leakage", "coefficient")
+    damping = leak / area * math.sqrt(beta * mass / volume) + on("viscous_friction", "coefficient") / (
+        4.0 * area
+    ) * math.sqrt(volume / (beta * mass))
+    return ClosedForm(
+        flow_gain=flow_gain,
+        flow_pressure=flow_pressure,
+        velocity_gain=flow_gain / area,
+        natural_frequency=area * math.sqrt(4.0 * beta / (volume * mass)),
+        damping=damping,
+    )
+
+
+def _smooth_plant(model: Model) -> tuple[Plant, dict[str, int]]:
+    """The plant without dry friction, and the states that take part."""
+    smooth = model
+    for name in model.effects:
+        effect = model.library[name]
+        if any("direction" in arguments(f) for f in effect.functions().values()):
+            smooth = smooth.without_effect(name)
+    plant = Plant(smooth)
+    owners = {*(s.name for s in base.STATES)} - {"stick"}
+    if model.kind == "mechanical":
+        owners -= {"pressure_a", "pressure_b"}
+    active = {
+        key: i
+        for key, i in plant.layout.states.items()
+        if key in owners or key.partition(".")[0] in smooth.effects and "." in key
+    }
+    return plant, active

@@ -1,0 +1,78 @@
+"""``effects [NAME] [--json] [--file F]``: the library of physical effects."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+from rich.console import Console
+from rich.table import Table
+
+from ..catalogue import describe, parameters_line
+from ..errors import HydraulicSimError
+from ..registry import Library, library
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print the library, or one effect whole. Exit code 0, or 2 for an unknown name or an unusable effect file."""
+    parser = argparse.ArgumentParser(prog="effects", description="List the physical effects a model can have.")
+    parser.add_argument("name", nargs="?", help="one effect, shown whole")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.add_argument("--file", action="append", default=[], metavar="F", help="an effect file of your own as well")
+    options = parser.parse_args(argv)
+    try:
+        found = library(options.file)
+        names = [options.name] if options.name else list(found)
+        records = [describe(found, name) for name in names]
+    except HydraulicSimError as error:
+        print(f"effects: {error}", file=sys.stderr)
+        return 2
+    if options.json:
+        print(json.dumps(records[0] if options.name else records, indent=2, ensure_ascii=False))
+    elif options.name:
+        _whole(records[0])
+    else:
+        _overview(found)
+    return 0
+
+
+def _overview(found: Library) -> None:
+    table = Table(title=f"{len(found)} effects", caption="effects NAME shows one whole")
+    for heading in ("slot", "effect", "what it is", "parameters (default)", "easily taken for"):
+        table.add_column(heading, overflow="fold")
+    for effect in found.values():
+        name = effect.name + (" (always on)" if effect.always_on else "")
+        table.add_row(effect.slot, name, effect.summary, parameters_line(effect), ", ".join(effect.confused_with))
+    Console().print(table)
+
+
+def _whole(record: dict) -> None:
+    console = Console(highlight=False)
+    console.print(f"[bold]{record['name']}[/bold]: {record['summary']}")
+    for label, key in (
+        ("acts in", "slot"),
+        ("shows in the balance of", "subsystem"),
+        ("equation", "equation"),
+        ("source", "source"),
+        ("excited by", "excited_by"),
+        ("told apart by", "told_apart_by"),
+        ("file", "file"),
+    ):
+        console.print(f"  {label}: {record[key]}", markup=False)
+    console.print(f"  easily taken for: {', '.join(record['confused_with']) or 'nothing'}", markup=False)
+    table = Table()
+    for heading in ("parameter", "unit", "default", "lowest", "highest", "null", "fit", "what", "source"):
+        table.add_column(heading, overflow="fold")
+    for p in record["parameters"]:
+        low, high = p["bounds"]
+        null = "" if p["null"] is None else f"{p['null']:g}"
+        fit = "free" if p["free"] else "fixed"
+        table.add_row(
+            p["name"], p["unit"], f"{p['default']:g}", f"{low:g}", f"{high:g}", null, fit, p["description"], p["source"]
+        )
+    console.print(table)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
