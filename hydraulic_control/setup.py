@@ -5,6 +5,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "hydraulic_control"
+DATA = ("csv", "csv.gz", "css", "eds", "html", "js", "json", "yaml")  # files installed beside the modules
 
 
 def executables() -> list[str]:
@@ -17,7 +18,7 @@ setup(
     name=NAME,
     version="0.1.0",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={"": ["*.yaml", "*.eds", "*.html", "*.css", "*.js", "py.typed"]},
+    package_data={NAME: ["py.typed", *(f"**/*.{kind}" for kind in DATA)]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

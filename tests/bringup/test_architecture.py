@@ -1,0 +1,144 @@
+"""The floors of the house: who may import whom, and where ROS may appear."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# A package and those below it: an import runs down, never up or sideways.
+BELOW = {
+    "hydraulic_interfaces": set(),
+    "hydraulic_sim": {"hydraulic_interfaces"},
+    "hydraulic_sysid": {"hydraulic_interfaces", "hydraulic_sim"},
+    "hydraulic_control": {"hydraulic_interfaces"},
+    "hydraulic_can_driver": {"hydraulic_interfaces"},
+    "hydraulic_bringup": {
+        "hydraulic_interfaces",
+        "hydraulic_sim",
+        "hydraulic_sysid",
+        "hydraulic_control",
+        "hydraulic_can_driver",
+    },
+}
+FOLDERS = {name: (ROOT / "ros_ws" / "src" / name).resolve() / name for name in BELOW}
+
+# The contract is where messages become plain values; everything else that knows ROS is a node.
+ROS_EXCEPTIONS = {"hydraulic_interfaces/conversions.py", "hydraulic_interfaces/qos.py"}
+ROS_SUFFIXES = ("_msgs", "_srvs", "_interfaces")
+ROS_NAMES = {"rclpy", "ament_index_python", "launch", "launch_ros", "rpyutils", "rosidl_parser"}
+
+
+def modules(package: str) -> Iterator[Path]:
+    """Python files of a package."""
+    yield from sorted(FOLDERS[package].rglob("*.py"))
+
+
+def imported(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Line and top-level name of every absolute import, also those inside functions and `import_module("…")`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name.split(".")[0]
+        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+            yield node.lineno, node.module.split(".")[0]
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in (
+            "import_module",
+            "__import__",
+        ):
+            first = node.args[0] if node.args else None
+            if isinstance(first, ast.Constant) and isinstance(first.value, str):
+                yield node.lineno, first.value.split(".")[0]
+
+
+def is_ros(name: str) -> bool:
+    """Whether a module comes from ROS (the contract package is ours)."""
+    return name in ROS_NAMES or (name.endswith(ROS_SUFFIXES) and name not in BELOW)
+
+
+def floor_violations(package: str, file: Path, text: str) -> list[str]:
+    """Imports of `file` that do not run down."""
+    allowed = BELOW[package] | {package}
+    return [
+        f"{file}:{line} imports {name}"
+        for line, name in imported(ast.parse(text))
+        if name in BELOW and name not in allowed
+    ]
+
+
+def ros_violations(package: str, file: Path, text: str) -> list[str]:
+    """Imports of ROS in a part of `file`'s package that must not know it."""
+    place = file.relative_to(FOLDERS[package].parent)
+    if place.parts[1] == "nodes" or place.as_posix() in ROS_EXCEPTIONS:
+        return []
+    return [f"{file}:{line} imports {name}" for line, name in imported(ast.parse(text)) if is_ros(name)]
+
+
+@pytest.mark.parametrize("package", BELOW)
+def test_imports_run_down(package: str) -> None:
+    found = [v for file in modules(package) for v in floor_violations(package, file, file.read_text("utf-8"))]
+    assert found == []
+
+
+@pytest.mark.parametrize("package", BELOW)
+def test_pure_logic_knows_no_ros(package: str) -> None:
+    found = [v for file in modules(package) for v in ros_violations(package, file, file.read_text("utf-8"))]
+    assert found == []
+
+
+def test_every_package_has_modules() -> None:
+    assert all(list(modules(package)) for package in BELOW)
+
+
+def test_the_entry_needs_only_the_standard_library() -> None:
+    entry = FOLDERS["hydraulic_bringup"] / "entry"
+    allowed = sys.stdlib_module_names | {"hydraulic_bringup"}
+    for file in sorted(entry.rglob("*.py")):
+        names = {name for _, name in imported(ast.parse(file.read_text("utf-8")))}
+        assert names <= allowed, f"{file}: {names - allowed}"
+
+
+def test_the_entry_stands_alone() -> None:
+    """It runs before anything is installed: of its own package it imports only itself."""
+    entry = FOLDERS["hydraulic_bringup"] / "entry"
+    for file in sorted(entry.rglob("*.py")):
+        depth = len(file.relative_to(entry).parts)
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                assert node.level <= depth, f"{file}:{node.lineno} leaves the entry"
+
+
+@pytest.mark.parametrize(
+    ("package", "place", "text", "found"),
+    [
+        ("hydraulic_sim", "plant.py", "from hydraulic_sysid import arx", 1),
+        ("hydraulic_control", "npid.py", "import hydraulic_sim.plant", 1),
+        ("hydraulic_can_driver", "devices.py", "def f():\n    import hydraulic_sim", 1),
+        ("hydraulic_sim", "plant.py", "import importlib\nimportlib.import_module('hydraulic_bringup.x')", 1),
+        ("hydraulic_sysid", "compare.py", "from hydraulic_sim.plant import Plant", 0),
+        ("hydraulic_bringup", "verbs/demo.py", "import hydraulic_sim, hydraulic_control", 0),
+    ],
+)
+def test_the_floor_rule_sees(package: str, place: str, text: str, found: int) -> None:
+    assert len(floor_violations(package, FOLDERS[package] / place, text)) == found
+
+
+@pytest.mark.parametrize(
+    ("package", "place", "text", "found"),
+    [
+        ("hydraulic_sim", "plant.py", "import rclpy", 1),
+        ("hydraulic_sim", "plant.py", "from sensor_msgs.msg import JointState", 1),
+        ("hydraulic_sysid", "verbs/recover.py", "import builtin_interfaces.msg", 1),
+        ("hydraulic_sim", "nodes/simulator.py", "import rclpy", 0),
+        ("hydraulic_interfaces", "conversions.py", "from std_msgs.msg import Bool", 0),
+        ("hydraulic_interfaces", "contract.py", "from std_msgs.msg import Bool", 1),
+        ("hydraulic_sim", "plant.py", "import hydraulic_interfaces", 0),
+    ],
+)
+def test_the_ros_rule_sees(package: str, place: str, text: str, found: int) -> None:
+    assert len(ros_violations(package, FOLDERS[package] / place, text)) == found
