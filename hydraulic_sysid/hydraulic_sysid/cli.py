@@ -9,7 +9,7 @@ A verb reads::
         parser = cli.parser("compare", "Compare a model with records.")
         cli.add_record_options(parser)
         cli.add_output_options(parser, "folder of the report")
-        return cli.run(parser, _compare, argv, errors=(ModelError, ComparisonError))
+        return cli.run(parser, _compare, argv)
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from hydraulic_sysid.records.errors import RecordError
+from hydraulic_sim.errors import HydraulicSimError
+from hydraulic_sysid.errors import HydraulicSysidError
 
 PROGRAM = "hydraulic_sysid"
 OK, NEGATIVE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
-class UsageError(Exception):
+class UsageError(HydraulicSysidError):
     """The command line asks for something that cannot be done; the message says what and what can."""
 
 
@@ -87,7 +88,7 @@ def run(
 ) -> int:
     """Parse ``argv``, call ``action`` and return the exit code; None from it counts as 0.
 
-    `RecordError`, `UsageError`, `OSError` and ``errors`` are the user's: printed, exit code 2.
+    `HydraulicSysidError`, `HydraulicSimError`, `OSError` and ``errors`` are the user's: printed, exit code 2.
     """
     try:
         options = parser.parse_args(argv)
@@ -104,7 +105,7 @@ def run(
     except KeyboardInterrupt:
         print(f"{parser.prog}: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except (RecordError, UsageError, OSError, *errors) as error:
+    except (HydraulicSysidError, HydraulicSimError, OSError, *errors) as error:
         print(f"{parser.prog}: {_text(error)}", file=sys.stderr)
         return BAD_INPUT
 

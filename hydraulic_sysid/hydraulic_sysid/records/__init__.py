@@ -1,5 +1,7 @@
 """Records: what was measured in one experiment, and how it is read from bags, CSV and MAT files."""
 
+from hydraulic_sysid.records.channels import CHANNELS, Channel
+from hydraulic_sysid.records.column_map import ColumnMap, load_column_map, parse_column_map, shipped_maps
 from hydraulic_sysid.records.errors import (
     BagError,
     ChannelError,
@@ -8,5 +10,23 @@ from hydraulic_sysid.records.errors import (
     RecordError,
     TimeError,
 )
+from hydraulic_sysid.records.reading import read_all, read_records
+from hydraulic_sysid.records.record import Record
 
-__all__ = ["BagError", "ChannelError", "ColumnMapError", "FileError", "RecordError", "TimeError"]
+__all__ = [
+    "CHANNELS",
+    "BagError",
+    "Channel",
+    "ChannelError",
+    "ColumnMap",
+    "ColumnMapError",
+    "FileError",
+    "Record",
+    "RecordError",
+    "TimeError",
+    "load_column_map",
+    "parse_column_map",
+    "read_all",
+    "read_records",
+    "shipped_maps",
+]

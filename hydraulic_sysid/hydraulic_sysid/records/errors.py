@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hydraulic_sysid.errors import HydraulicSysidError
 
-class RecordError(ValueError):
+
+class RecordError(HydraulicSysidError, ValueError):
     """Base of all: a record, or something asked of it, is not acceptable.
 
     The message says where (file, row or sample, column or channel), the value found and what is allowed.
@@ -43,6 +45,10 @@ class TimeError(FileError):
 
 class ColumnMapError(RecordError):
     """A column map is wrong in itself, or names columns that the file does not have."""
+
+
+class UnitError(RecordError):
+    """A unit is unknown, or does not measure what its channel is."""
 
 
 class BagError(FileError):

@@ -1,0 +1,199 @@
+"""Column maps: which column of a CSV or MAT file is which channel, in which unit and with which sign."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from hydraulic_sysid.records.channels import CHANNELS, allowed
+from hydraulic_sysid.records.errors import ColumnMapError
+from hydraulic_sysid.records.units import si_unit, to_si
+
+IRREGULAR = ("error", "resample", "split")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: SI value = to_SI(sign · scale · number + offset, ``unit``).
+
+    ``column`` is the name in the header (the variable in a MAT file), or the index from 0.
+    """
+
+    column: str | int
+    unit: str
+    factor: float
+    """From ``unit`` to SI; with ``shift``, which is not 0 for units such as degrees."""
+    shift: float = 0.0
+    sign: int = 1
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def si(self, numbers: Any) -> Any:
+        """Numbers of the file in SI."""
+        return self.factor * (self.sign * self.scale * numbers + self.offset) + self.shift
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """How a table becomes records; each of ``parts`` becomes one, named after its key.
+
+    Either ``time`` is a column or ``dt`` is the period in seconds. ``irregular`` says what to do with stamps
+    that are not even: refuse them, resample (interpolate on the even grid) or split into several records.
+    ``header``: None looks for itself; ``delimiter`` and ``decimal`` too.
+    """
+
+    parts: Mapping[str, Mapping[str, Column]]
+    time: Column | None = None
+    dt: float | None = None
+    irregular: str = "error"
+    header: bool | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    name: str = ""
+    notes: Sequence[str] = field(default_factory=tuple)
+
+
+def shipped_maps() -> dict[str, Path]:
+    """Column maps that come with the package, by name."""
+    folder = Path(str(resources.files("hydraulic_sysid"))) / "columns"
+    return {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+
+
+def load_column_map(source: str | Path) -> ColumnMap:
+    """The map in a YAML file, or the shipped one of that name.
+
+    :raises ColumnMapError: no such file or name, not YAML, or contents that mean nothing.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    path = Path(source)
+    if not path.is_file():
+        shipped = shipped_maps()
+        if str(source) not in shipped:
+            names = ", ".join(shipped)
+            raise ColumnMapError(f"{source}: no such column map; give a YAML file, or one of {names}")
+        path = shipped[str(source)]
+    try:
+        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise ColumnMapError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    return parse_column_map(document, str(path))
+
+
+def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
+    """The map in a document as YAML gives it; ``where`` names it in errors.
+
+    :raises ColumnMapError: contents that mean nothing; the text names the key and what is allowed.
+    """
+    keys = ("time", "channels", "records", "header", "delimiter", "decimal", "notes")
+    top = _mapping(document, where, keys)
+    if ("channels" in top) == ("records" in top):
+        raise ColumnMapError(f"{where}: needs either 'channels' or 'records' (several groups of channels)")
+    groups = {"": top["channels"]} if "channels" in top else _mapping(top["records"], f"{where}: records")
+    parts = {
+        str(name): _channels(group, f"{where}: records.{name}" if name else f"{where}: channels")
+        for name, group in groups.items()
+    }
+    if not parts:
+        raise ColumnMapError(f"{where}: records is empty")
+    time = _mapping(top.get("time"), f"{where}: time", ("column", "unit", "scale", "dt", "irregular"))
+    if ("dt" in time) == ("column" in time):
+        raise ColumnMapError(f"{where}: time needs either 'column' or 'dt' (the period in seconds)")
+    irregular = _choice(time.get("irregular", "error"), f"{where}: time.irregular", IRREGULAR)
+    dt, column = None, None
+    if "dt" in time:
+        dt = _number(time["dt"], f"{where}: time.dt")
+        if dt <= 0.0:
+            raise ColumnMapError(f"{where}: time.dt is {dt:g} s, must be positive")
+    else:
+        entry = {key: time[key] for key in ("column", "unit", "scale") if key in time}
+        column = _column(entry, "time", f"{where}: time")
+    notes = top.get("notes", [])
+    return ColumnMap(
+        parts,
+        column,
+        dt,
+        irregular,
+        _choice(top.get("header"), f"{where}: header", (True, False, None)),
+        _choice(top.get("delimiter"), f"{where}: delimiter", (",", ";", "\t", " ", None)),
+        _choice(top.get("decimal"), f"{where}: decimal", (".", ",", None)),
+        where,
+        tuple(str(note) for note in ([notes] if isinstance(notes, str) else notes)),
+    )
+
+
+def column_of_header(header: str) -> tuple[str, Column]:
+    """Quantity ("time" or a channel) and column of a header such as "position_mm" or "pressure_a_bar".
+
+    :raises ColumnMapError: no such channel, no unit, or a unit that does not fit.
+    """
+    text = header.strip()
+    where = f"column {text!r}"
+    # The longest name first: "pressure_a_bar" is not a channel "pressure" in the unit "a_bar".
+    for quantity in sorted(("time", *CHANNELS), key=len, reverse=True):
+        if text == quantity or text.startswith(f"{quantity}_"):
+            unit = text[len(quantity) + 1 :]
+            if not unit:
+                raise ColumnMapError(f"{where}: no unit; write {quantity}_{si_unit(quantity)}, for example")
+            return quantity, Column(text, unit, *to_si(unit, quantity, where))
+    raise ColumnMapError(
+        f"{where} is no channel; expected <channel>_<unit> with time, {allowed()}; "
+        "a column map can name or leave out any column"
+    )
+
+
+def _channels(document: Any, where: str) -> dict[str, Column]:
+    entries = _mapping(document, where)
+    for name in entries:
+        if name not in CHANNELS:
+            raise ColumnMapError(f"{where}: {name!r} is no channel; allowed: {allowed()}")
+    # "pressure_b: null" says in so many words that a channel was not measured.
+    columns = {n: _column(entry, n, f"{where}.{n}") for n, entry in entries.items() if entry is not None}
+    if not columns:
+        raise ColumnMapError(f"{where}: no channel is mapped")
+    return columns
+
+
+def _column(document: Any, quantity: str, where: str) -> Column:
+    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset"))
+    if "column" not in entry:
+        raise ColumnMapError(f"{where}: 'column' is missing (a name in the header, or an index from 0)")
+    column = entry["column"]
+    if isinstance(column, bool) or not isinstance(column, (str, int)) or (isinstance(column, int) and column < 0):
+        raise ColumnMapError(f"{where}: column is {column!r}, must be a name or an index from 0")
+    sign = _choice(entry.get("sign", 1), f"{where}.sign", (1, -1))
+    scale = _number(entry.get("scale", 1.0), f"{where}.scale")
+    if scale == 0.0:
+        raise ColumnMapError(f"{where}.scale is 0, must not be")
+    if "unit" not in entry:
+        raise ColumnMapError(f"{where}: 'unit' is missing; it must convert to {si_unit(quantity)}")
+    unit = str(entry["unit"])
+    offset = _number(entry.get("offset", 0.0), f"{where}.offset")
+    return Column(column, unit, *to_si(unit, quantity, where), sign, scale, offset)
+
+
+def _mapping(document: Any, where: str, keys: Sequence[str] | None = None) -> Mapping[str, Any]:
+    if not isinstance(document, Mapping):
+        raise ColumnMapError(f"{where}: is {document!r}, must be a mapping of keys")
+    for key in document:
+        if keys is not None and key not in keys:
+            raise ColumnMapError(f"{where}: unknown key {key!r}; allowed: {', '.join(keys)}")
+    return document
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ColumnMapError(f"{where} is {value!r}, must be a finite number")
+    return float(value)
+
+
+def _choice(value: Any, where: str, choices: Sequence[Any]) -> Any:
+    if not any(value == choice and type(value) is type(choice) for choice in choices):
+        names = ", ".join(repr(choice) for choice in choices)
+        raise ColumnMapError(f"{where} is {value!r}; allowed: {names}")
+    return value
