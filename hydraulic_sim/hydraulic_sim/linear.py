@@ -100,9 +100,10 @@ def operating_point(model: Model, position: float = 0.0, drive: float = 0.0) -> 
 
     found = least_squares(residual, start[moving] / scales[moving], xtol=1e-14, ftol=1e-14, gtol=1e-14)
     # At rest a closed valve holds any common pressure, so that the residual counts and not the solution's spread.
-    if not np.max(np.abs(found.fun)) < 1e-6:
+    worst = float(np.max(np.abs(found.fun)))
+    if not worst < 1e-6:
         raise SimulationError(
-            f"{model.name}: no steady motion at {drive:g} V and x = {position:g} m (residual {np.max(np.abs(found.fun)):.2g})"
+            f"{model.name}: no steady motion at {drive:g} V and x = {position:g} m (residual {worst:.2g})"
         )
     state = start.copy()
     state[moving] = found.x * scales[moving]

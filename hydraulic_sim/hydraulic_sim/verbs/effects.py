@@ -9,6 +9,7 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
+from .. import slots
 from ..catalogue import describe, parameters_line
 from ..errors import HydraulicSimError
 from ..registry import Library, library
@@ -39,11 +40,17 @@ def main(argv: list[str] | None = None) -> int:
 
 def _overview(found: Library) -> None:
     table = Table(title=f"{len(found)} effects", caption="effects NAME shows one whole")
-    for heading in ("slot", "effect", "what it is", "parameters (default)", "easily taken for"):
-        table.add_column(heading, overflow="fold")
+    table.add_column("effect", no_wrap=True)
+    table.add_column("what it is")
+    table.add_column("parameters (default)")
+    slot = ""
     for effect in found.values():
-        name = effect.name + (" (always on)" if effect.always_on else "")
-        table.add_row(effect.slot, name, effect.summary, parameters_line(effect), ", ".join(effect.confused_with))
+        if effect.slot != slot:
+            slot = effect.slot
+            table.add_section()
+            table.add_row(f"[bold]{slot}[/bold]", f"[dim]{slots.SLOTS[slot].what}[/dim]", "")
+        summary = effect.summary + (" (always on)" if effect.always_on else "")
+        table.add_row(f"  {effect.name}", summary, parameters_line(effect))
     Console().print(table)
 
 
