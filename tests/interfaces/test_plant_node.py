@@ -181,3 +181,17 @@ def test_a_factor_without_a_clock_is_refused(start: Any, client: Any) -> None:
     process = start("-p", "real_time_factor:=2.0", autostart=False)
     assert not client.change_state("configure")
     process.says("real_time_factor is 2")
+
+
+def test_a_plant_follows_no_other_clock(start: Any, client: Any) -> None:
+    process = start("-p", "use_sim_time:=true", autostart=False)
+    assert not client.change_state("configure")
+    process.says("use_sim_time is true")
+
+
+def test_the_clock_does_not_follow_itself(start: Any, client: Any, wait_until: Any) -> None:
+    states = client.collect("state")
+    start("-p", "use_sim_time:=true", "-p", "publish_clock:=true")
+    wait_until(lambda: len(states) > 10, "states of a plant that was launched on simulated time")
+    subscribers = client.node.get_subscriptions_info_by_topic("/clock")
+    assert "plant" not in [info.node_name for info in subscribers]

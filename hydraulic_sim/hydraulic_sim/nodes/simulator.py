@@ -17,7 +17,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.nodes._sensors import Sensor
 from hydraulic_sim.plant import Plant
 
-DEFAULT_MODEL = "sample_bench"
+DEFAULT_MODEL = "moog_mcr_m_1002_bench"
 MODEL_PREFIX = "model."
 
 SENSORS: tuple[ParameterSpec, ...] = (

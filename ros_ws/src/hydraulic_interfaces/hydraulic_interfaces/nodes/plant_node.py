@@ -12,6 +12,7 @@ import gc
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
 from hydraulic_interfaces.command_gate import CommandGate
@@ -90,6 +91,8 @@ class PlantNode(LifecycleNode):
                 own_clock=values.get("publish_clock", False),
                 priority=values["realtime_priority"],
             )
+            if self.get_parameter("use_sim_time").value and not self._timing.own_clock:
+                raise ValueError("use_sim_time is true: a plant follows no other clock, it may only publish one")
             late = self._backend.configure(values)
             self._late_parameters = [spec.name for spec in late]
             self._table.declare(late)
@@ -101,6 +104,7 @@ class PlantNode(LifecycleNode):
             return FAILURE
         if self._timing.own_clock:
             self._ports.open_clock()
+            self.set_parameters([Parameter("use_sim_time", value=False)])
         self._table.warn_of_unknown()
         self._state = "inactive"
         return SUCCESS
@@ -188,7 +192,7 @@ class PlantNode(LifecycleNode):
         except Exception as error:
             self.gate.enable(False)
             response.message = f"the plant refuses: {error}"
-            self._complain(response.message)
+            self.get_logger().error(response.message)
         return response
 
     def _on_emergency_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -198,7 +202,8 @@ class PlantNode(LifecycleNode):
         try:
             self._backend.set_enabled(False)
         except Exception as error:
-            self._complain(f"disabling failed: {error}")
+            # The gate holds 0 V all the same.
+            self.get_logger().error(f"disabling failed: {error}")
         return response
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import Any
 
 from rclpy.node import Node
@@ -19,7 +20,7 @@ from hydraulic_interfaces.conversions import (
     interface_class,
 )
 from hydraulic_interfaces.nodes.mailbox import Mailbox
-from hydraulic_interfaces.qos import profile
+from hydraulic_interfaces.qos import STREAM_DEPTH, profile
 from hydraulic_interfaces.samples import PlantSample
 
 
@@ -42,7 +43,8 @@ class PlantPorts:
 
     def take_commands(self, gate: CommandGate, now_ns: int) -> None:
         """Put every waiting command through the gate."""
-        for message in self._commands.take():
+        # A source that floods the topic must not hold up the plant's cycle.
+        for message in islice(self._commands.take(), STREAM_DEPTH):
             try:
                 command = command_from_message(message)
             except MessageError as error:

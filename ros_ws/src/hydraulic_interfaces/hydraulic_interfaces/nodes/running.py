@@ -17,6 +17,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from hydraulic_interfaces.nodes.discovery import stay_local
 from hydraulic_interfaces.nodes.plant_node import PARAMETERS, PlantNode
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.plant_backend import PlantBackend
@@ -33,6 +34,7 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     """
     arguments = sys.argv if argv is None else [sys.argv[0], *argv]
     options = _parser(description, (*PARAMETERS, *backend.parameters())).parse_args(remove_ros_args(arguments)[1:])
+    stay_local()
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     overrides = [Parameter("autostart", value=True)] if options.autostart else []
     try:
