@@ -12,16 +12,12 @@ from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import PISTON, SERVOVALVE, topic
 from hydraulic_sysid.bag import cdr, reader
-from hydraulic_sysid.bag.reader import Bag, is_bag
+from hydraulic_sysid.bag.reader import Bag
 from hydraulic_sysid.bag.writer import SUFFIX
 from hydraulic_sysid.records.errors import BagError, TimeError
 from hydraulic_sysid.records.experiments import Span, spans
 from hydraulic_sysid.records.record import Record
 from hydraulic_sysid.records.table import Samples, drive_from_command, evenly_sampled
-
-__all__ = ["SUFFIXES", "is_bag", "read_bag"]
-
-SUFFIXES = (SUFFIX,)
 
 PRESSURES = ("pressure_a", "pressure_b", "pressure_supply")
 HELD = {"command": (SERVOVALVE, "effort"), "reference": (PISTON, "position")}

@@ -26,6 +26,7 @@ CHANNELS: dict[str, Channel] = {
     "reference": Channel("m", "position that a controller was asked to follow"),
 }
 
+TIME = "time"
 TIME_UNIT = "s"
 
 HELD = frozenset({"command", "drive", "reference"})

@@ -6,6 +6,7 @@ import csv
 import gzip
 import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,9 @@ def read_csv(path: Path, columns: ColumnMap | None, name: str) -> list[Record]:
     :raises ColumnMapError: a header that names no channel, or has a wrong unit.
     """
     table = CsvTable(path, columns)
-    return records_of_table(table, columns or table.map_of_header(), name)
+    if columns is None or not columns.parts:
+        columns = table.map_of_header(columns)
+    return records_of_table(table, columns, name)
 
 
 class CsvTable:
@@ -70,8 +73,8 @@ class CsvTable:
         self._numbers: Array | None = None
         self._unread: dict[int, Array] = {}
 
-    def map_of_header(self) -> ColumnMap:
-        """The map that the header states.
+    def map_of_header(self, base: ColumnMap | None = None) -> ColumnMap:
+        """The map that the header states; ``base`` says the rest, and perhaps the time.
 
         :raises ColumnMapError: no header, no time, or a name that is no channel with a unit.
         """
@@ -87,11 +90,14 @@ class CsvTable:
         if len(found) != len(self.names):
             raise ColumnMapError(f"{self.path}, row 1: two columns are the same channel: {self.names}")
         time = found.pop("time", None)
-        if time is None:
+        base = base or ColumnMap({})
+        if base.time is not None or base.dt is not None:
+            time = base.time
+        elif time is None:
             raise ColumnMapError(f"{self.path}, row 1: no time column; expected one such as time_s")
         if not found:
             raise ColumnMapError(f"{self.path}, row 1: only a time; expected channels beside it")
-        return ColumnMap({"": found}, time)
+        return replace(base, parts={"": found}, time=time)
 
     def numbers(self, column: str | int) -> Array:
         """``(N,)`` numbers of a column."""
@@ -130,9 +136,7 @@ class CsvTable:
         for index, width in enumerate(widths):
             if width != self._width and len(self._cells(self._lines[index])) != self._width:
                 cells = len(self._cells(self._lines[index]))
-                raise FileError(
-                    self.path, f"{cells} cells", row=self._rows[index], expected=f"{self._width} cells"
-                )
+                raise FileError(self.path, f"{cells} cells", row=self._rows[index], expected=f"{self._width} cells")
 
     def _index(self, column: str | int) -> int:
         if isinstance(column, str):
@@ -140,9 +144,9 @@ class CsvTable:
                 there = ", ".join(self.names) if self.names else "no header"
                 raise FileError(self.path, f"no column {column!r}; there is {there}")
             return list(self.names).index(column)
-        if column >= self._width:
-            raise FileError(self.path, f"no column {column}; there are 0 … {self._width - 1}")
-        return column
+        if column > self._width:
+            raise FileError(self.path, f"no column {column}; there are 1 … {self._width}")
+        return column - 1
 
     def _parse(self, wanted: Sequence[int] | None) -> Array:
         lines = [line.replace(",", ".") for line in self._lines] if self._comma else self._lines

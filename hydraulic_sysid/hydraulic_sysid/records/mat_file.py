@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hydraulic_sysid.records.channels import TIME
 from hydraulic_sysid.records.column_map import ColumnMap, column_of_header
 from hydraulic_sysid.records.errors import ColumnMapError, FileError
 from hydraulic_sysid.records.record import Record
@@ -25,11 +27,13 @@ def read_mat(path: Path, columns: ColumnMap | None, name: str) -> list[Record]:
     :raises ColumnMapError: without a map: no variables with such names.
     """
     table = MatTable(path)
-    return records_of_table(table, columns or table.map_of_names(), name)
+    if columns is None or not columns.parts:
+        columns = table.map_of_names(columns)
+    return records_of_table(table, columns, name)
 
 
 class MatTable:
-    """The variables of a MATLAB file; a matrix gives its columns as ``name.0``, ``name.1``, …"""
+    """The variables of a MATLAB file; a matrix gives its columns as ``name.1``, ``name.2``, …"""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -40,7 +44,7 @@ class MatTable:
             if value.ndim == 2 and 1 in value.shape and value.size > 1:
                 self._columns[name] = value.ravel()
             elif value.ndim == 2 and value.size > 1:
-                for index, column in enumerate(value.T):
+                for index, column in enumerate(value.T, start=1):
                     self._columns[f"{name}.{index}"] = column
 
     @property
@@ -48,8 +52,8 @@ class MatTable:
         """Names of all columns."""
         return list(self._columns)
 
-    def map_of_names(self) -> ColumnMap:
-        """The map that the variables' names state; other variables are left out.
+    def map_of_names(self, base: ColumnMap | None = None) -> ColumnMap:
+        """The map that the variables' names state; other variables are left out. ``base`` says the rest.
 
         :raises ColumnMapError: no time, or no channel.
         """
@@ -60,14 +64,17 @@ class MatTable:
             except ColumnMapError:
                 continue  # a MATLAB file is a whole workspace: what is not named as a channel is not meant
             found[quantity] = column
-        time = found.pop("time", None)
-        if time is None or not found:
+        time = found.pop(TIME, None)
+        base = base or ColumnMap({})
+        if base.time is not None or base.dt is not None:
+            time = base.time
+        if (time is None and base.dt is None) or not found:
             there = ", ".join(self._columns) or "none"
             raise ColumnMapError(
                 f"{self.path}: no vectors time_s and <channel>_<unit>; there are {there}; "
                 "say by a column map what they are"
             )
-        return ColumnMap({"": found}, time)
+        return replace(base, parts={"": found}, time=time)
 
     def numbers(self, column: str | int) -> Array:
         """``(N,)`` numbers of a variable."""
@@ -83,8 +90,8 @@ class MatTable:
         return self._name(column)
 
     def _name(self, column: str | int) -> str:
-        if isinstance(column, int) and column < len(self._columns):
-            return self.names[column]
+        if isinstance(column, int) and column <= len(self._columns):
+            return self.names[column - 1]
         if column not in self._columns:
             there = ", ".join(self._columns) or "no vectors"
             raise FileError(self.path, f"no variable {column!r}; there are {there}")

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from hydraulic_sysid.records import bag_record, csv_file, mat_file
+from hydraulic_sysid.records import csv_file, mat_file
 from hydraulic_sysid.records.column_map import ColumnMap, load_column_map
 from hydraulic_sysid.records.errors import FileError, RecordError
 from hydraulic_sysid.records.record import Record
+
+_BAG_SUFFIX = ".mcap"
+_SUFFIXES = (*csv_file.SUFFIXES, *mat_file.SUFFIXES, _BAG_SUFFIX)
+
+# The reader of bags is loaded when there is one to read: it needs this package's errors itself.
+BAG_SUFFIX = ".mcap"
+METADATA = "metadata.yaml"
 
 
 def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None) -> list[Record]:
@@ -24,7 +31,7 @@ def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None
     mapping = columns if isinstance(columns, ColumnMap) or columns is None else load_column_map(columns)
     if not path.exists():
         raise FileError(path, "does not exist")
-    if path.is_dir() and not bag_record.is_bag(path):
+    if path.is_dir() and not is_bag(path):
         entries = [entry for entry in sorted(path.iterdir()) if _holds_record(entry)]
         if not entries:
             raise FileError(path, "holds no records", expected=_kinds())
@@ -46,25 +53,32 @@ def read_all(paths: Iterable[Path | str], columns: ColumnMap | Path | str | None
     return records
 
 
+def is_bag(folder: Path) -> bool:
+    """Whether a folder is a bag, complete or left behind by a recorder."""
+    return (folder / METADATA).is_file() or any(folder.glob(f"*{BAG_SUFFIX}"))
+
+
+def _is_bag(folder: Path) -> bool:
+    """Whether a folder is a bag, complete or left behind by a recorder."""
+    return (folder / "metadata.yaml").is_file() or any(folder.glob(f"*{_BAG_SUFFIX}"))
+
+
 def _holds_record(path: Path) -> bool:
-    if path.is_dir():
-        return bag_record.is_bag(path)
-    return path.name.lower().endswith((*csv_file.SUFFIXES, *mat_file.SUFFIXES, *bag_record.SUFFIXES))
+    return _is_bag(path) if path.is_dir() else path.name.lower().endswith(_SUFFIXES)
 
 
 def _read(path: Path, columns: ColumnMap | None) -> list[Record]:
-    lowered = path.name.lower()
-    if path.is_dir() or lowered.endswith(bag_record.SUFFIXES):
-        return bag_record.read_bag(path, columns.irregular if columns else "error")
-    stem = path.name[: -len(next(s for s in _suffixes() if lowered.endswith(s)))]
-    if lowered.endswith(mat_file.SUFFIXES):
+    suffix = next((s for s in sorted(_SUFFIXES, key=len, reverse=True) if path.name.lower().endswith(s)), "")
+    if path.is_dir() or suffix == _BAG_SUFFIX:
+        # Here and not above: what reads bags takes long to load, and most records are tables.
+        from hydraulic_sysid.records.bag_record import read_bag
+
+        return read_bag(path, columns.irregular if columns else "error")
+    stem = path.name[: -len(suffix)]
+    if suffix in mat_file.SUFFIXES:
         return mat_file.read_mat(path, columns, stem)
     return csv_file.read_csv(path, columns, stem)
 
 
-def _suffixes() -> list[str]:
-    return sorted((*csv_file.SUFFIXES, *mat_file.SUFFIXES), key=len, reverse=True)
-
-
 def _kinds() -> str:
-    return f"a bag folder, or a file {', '.join((*csv_file.SUFFIXES, *mat_file.SUFFIXES, *bag_record.SUFFIXES))}"
+    return f"a bag folder, or a file {', '.join(_SUFFIXES)}"

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Channels in SI units over one uniform time; see `CHANNELS` for names and units.
+    """Channels over one uniform time: those of `CHANNELS` in SI units, others in the unit that ``units`` gives.
 
     ``time`` is ``(N,)``, starts at 0 and steps by ``dt``; every channel is ``(N,)`` and read-only. A channel
     that was not measured is absent. ``description`` can be written as JSON; its ``notes`` say in words what
@@ -34,6 +34,7 @@ class Record:
     channels: dict[str, Array]
     source: Path = Path()
     description: dict[str, Any] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", _frozen(self.time, self.name, "time"))
@@ -45,8 +46,10 @@ class Record:
             raise RecordError(f"{self.name}: the time is not 0, dt, 2·dt, … with dt = {self.dt:g} s")
         channels = {}
         for name, values in self.channels.items():
-            if name not in CHANNELS:
-                raise ChannelError(f"{self.name}: {name!r} is no channel; allowed: {allowed()}")
+            if name not in CHANNELS and name not in self.units:
+                raise ChannelError(
+                    f"{self.name}: {name!r} is no channel; allowed: {allowed()}, or a name with a unit of its own"
+                )
             channels[name] = _frozen(values, self.name, name)
             if channels[name].size != self.time.size:
                 sizes = f"{channels[name].size} samples, the time {self.time.size}"
@@ -61,10 +64,11 @@ class Record:
         channels: Mapping[str, Array],
         source: Path = Path(),
         description: Mapping[str, Any] | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> Record:
         """The record of channels that were sampled every ``dt`` seconds."""
         count = len(next(iter(channels.values()), ()))
-        return cls(name, dt * np.arange(count), dt, dict(channels), source, dict(description or {}))
+        return cls(name, dt * np.arange(count), dt, dict(channels), source, dict(description or {}), dict(units or {}))
 
     def __contains__(self, channel: object) -> bool:
         return channel in self.channels
@@ -84,6 +88,10 @@ class Record:
     def duration(self) -> float:
         """Seconds, N·dt: every sample stands for one period."""
         return len(self) * self.dt
+
+    def unit(self, channel: str) -> str:
+        """Unit of a channel: SI, or its own where ``units`` gives one."""
+        return self.units[channel] if channel in self.units else CHANNELS[channel].unit
 
     @property
     def notes(self) -> list[str]:

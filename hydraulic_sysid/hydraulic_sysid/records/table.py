@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -17,6 +17,8 @@ from hydraulic_sysid.records.errors import FileError, TimeError
 from hydraulic_sysid.records.record import Record
 
 Array = NDArray[np.float64]
+
+_MOST_SAMPLES = 20_000_000  # of a resampled record
 
 
 class Table(Protocol):
@@ -47,6 +49,7 @@ class Samples:
     channels: Mapping[str, Array]
     row: Callable[[int], int]
     column: str | int
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def records_of_table(table: Table, columns: ColumnMap, name: str) -> list[Record]:
@@ -67,14 +70,14 @@ def records_of_table(table: Table, columns: ColumnMap, name: str) -> list[Record
             if len(sizes) != 1 or min(sizes) < 2:
                 raise FileError(table.path, f"columns have {sorted(sizes)} samples", expected="equal lengths ≥ 2")
             description["notes"] = notes
-            records.append(Record.sampled(title, columns.dt, channels, table.path, description))
+            records.append(Record.sampled(title, columns.dt, channels, table.path, description, columns.units))
             continue
         assert columns.time is not None
         time = _finite(table, columns.time)
         if sizes != {time.size} or time.size < 2:
             problem = f"channels have {sorted(sizes)} samples, the time {time.size}"
             raise FileError(table.path, problem, expected="equal lengths, at least 2")
-        samples = Samples(table.path, time, channels, table.row, table.label(columns.time.column))
+        samples = Samples(table.path, time, channels, table.row, table.label(columns.time.column), columns.units)
         records += evenly_sampled(samples, columns.irregular, title, notes, description)
     return records
 
@@ -134,14 +137,18 @@ def _pieces(
             described["piece"] = [number, len(pieces)]
         channels = {channel: values[first:last] for channel, values in samples.channels.items()}
         title = f"{name}.{number}" if len(pieces) > 1 else name
-        yield Record.sampled(title, even.dt, channels, samples.path, described)
+        yield Record.sampled(title, even.dt, channels, samples.path, described, samples.units)
 
 
 def _resampled(samples: Samples, name: str, notes: Sequence[str], description: Mapping[str, Any]) -> Record:
     """On the even grid with the median period; drives hold their value, the rest is interpolated linearly."""
     time = samples.time
-    dt = float(np.median(np.diff(time)))
-    count = int((time[-1] - time[0]) / dt + 1e-6) + 1
+    dt = float(f"{np.median(np.diff(time)):.9g}")
+    span = float(time[-1] - time[0])
+    if span > _MOST_SAMPLES * dt:
+        problem = f"resampling {span:.6g} s every {dt:.6g} s makes more than {_MOST_SAMPLES} samples"
+        raise sampling.IrregularTime(int(np.argmax(np.diff(time))) + 1, problem, "shorter gaps")
+    count = int(span / dt + 1e-6) + 1
     grid = time[0] + dt * np.arange(count)
     before = np.clip(np.searchsorted(time, grid + 1e-6 * dt, side="right") - 1, 0, time.size - 1)
     channels = {
@@ -151,7 +158,7 @@ def _resampled(samples: Samples, name: str, notes: Sequence[str], description: M
     longest = float(np.diff(time).max())
     note = f"resampled from {time.size} irregular samples (longest step {longest:.6g} s) to dt = {dt:.9g} s"
     described = {**description, "notes": [*notes, note], "start_s": float(time[0])}
-    return Record.sampled(name, dt, channels, samples.path, described)
+    return Record.sampled(name, dt, channels, samples.path, described, samples.units)
 
 
 def _finite(table: Table, column: Column) -> Array:
@@ -167,4 +174,3 @@ def _finite(table: Table, column: Column) -> Array:
         )
     values: Array = np.asarray(column.si(numbers), dtype=np.float64)
     return values
-
