@@ -202,8 +202,10 @@ def measure_bare(seconds: float) -> dict[str, object]:
 
 def line(name: str, result: dict[str, object]) -> str:
     """One row of the table."""
-    jitter, delivery, missing = result["jitter_ms"], result["delivery_ms"], result["gaps"]
-    lost = sum(max(count, 0) for count in missing.values())
+    jitter, delivery, missing = result["jitter_ms"], result["delivery_ms"], dict(result["gaps"])
+    # A command is lost if it was sent and not recorded, not if the controller had no state to answer.
+    missing["command"] = result["sent"] - result["received"]["command"] if result["received"]["command"] else 0
+    lost = sum(missing.values())
     cells = [f"{jitter[key]:8.3f}" for key in ("p50", "p99", "max")] + [f"{delivery[k]:8.3f}" for k in ("p50", "p99")]
     return f"{name:24s} {lost:6d} {' '.join(cells)}"
 

@@ -20,7 +20,7 @@ from hydraulic_interfaces.conversions import (
     interface_class,
 )
 from hydraulic_interfaces.nodes.mailbox import Mailbox
-from hydraulic_interfaces.qos import STREAM_DEPTH, profile
+from hydraulic_interfaces.qos import STREAM_DEPTH, STREAM_HISTORY, profile
 from hydraulic_interfaces.samples import PlantSample
 
 
@@ -83,4 +83,6 @@ class PlantPorts:
 
     @staticmethod
     def _publisher(node: Node, name: str) -> Any:
-        return node.create_publisher(interface_class(find_topic(name).type), name, profile(name))
+        row = find_topic(name)
+        depth = STREAM_HISTORY if row.qos == "stream" else None
+        return node.create_publisher(interface_class(row.type), name, profile(name, depth))
