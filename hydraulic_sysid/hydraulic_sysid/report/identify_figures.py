@@ -1,0 +1,80 @@
+"""Figures of an identification. Each function takes the result document and returns a Plotly figure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from . import style
+from .style import Panels
+
+Result = dict[str, Any]
+
+
+def overlay(result: Result, part: str, record: int) -> go.Figure:
+    """Measured output, free run and one-step prediction of one record of ``estimation`` or ``validation``."""
+    traces, settings = result[part]["records"][record]["traces"], result["settings"]
+    input_factor, input_unit = style.shown(settings["input"]["unit"])
+    factor, unit = style.shown(settings["output"]["unit"])
+    panels = Panels(3, heights=[0.8, 2.0, 1.2], gap=(0.0, 0.03), one_time=True)
+    parts = (
+        ("input", 0, "input", style.MEASURED, 1.3, input_factor),
+        ("measured", 1, "measured", style.MEASURED, 3.2, factor),
+        ("free_run", 1, "free run", style.FREE_RUN, 1.5, factor),
+        ("one_step", 1, "one step ahead", style.ONE_STEP, 1.5, factor),
+        ("free_run_error", 2, "free run", style.FREE_RUN, 1.2, factor),
+        ("one_step_error", 2, "one step ahead", style.ONE_STEP, 1.2, factor),
+    )
+    for key, panel, label, colour, width, scale in parts:
+        x, y = style.values(traces[key]["time"]), style.values(traces[key]["value"], scale)
+        line = {"color": colour, "width": width}
+        panels.line(panel, x, y, label, legend=panel == 1, line=line, hovertemplate="%{y:.4g}")
+    panels.y_axis(0, f"{settings['input']['channel']}<br>[{input_unit}]", nticks=4)
+    panels.y_axis(1, f"{settings['output']['channel']}<br>[{unit}]", nticks=6)
+    panels.y_axis(2, f"error<br>[{unit}]", nticks=5)
+    panels.x_axis(0, "time [s]", anchor="y3", mirror="all")
+    return panels.figure(430, hovermode="x unified", hoversubplots="axis")
+
+
+def residual_tests(result: Result, part: str, record: int) -> go.Figure | None:
+    """Correlations of the one-step residual with itself and with the input, with their 95 % bounds.
+
+    None where the stretch was too short for the test.
+    """
+    tests = result[part]["records"][record]["residual_tests"]
+    if tests is None:
+        return None
+    lags, bound = tests["lags"], tests["bound"]
+    panels = Panels(1, 2, gap=(0.07, 0.0), titles=["Residual with itself", "Residual with the input"])
+    for panel, key, first in ((0, "autocorrelation", 0), (1, "cross_correlation", -lags)):
+        y = style.values(tests[key])
+        x = np.arange(first, lags + 1, dtype=np.float32)
+        expected = (np.abs(y) <= bound) | ((x == 0) & (key == "autocorrelation"))
+        colours = [style.ONE_STEP if ok else style.FREE_RUN for ok in expected]
+        panels.line(panel, x, y, type="bar", marker={"color": colours})
+        panels.band(panel, -bound, bound)
+        panels.x_axis(panel, "lag [samples]")
+    return panels.figure(270, bargap=0.35, margin={"l": 66, "r": 14, "t": 52, "b": 44})
+
+
+def poles(result: Result) -> go.Figure:
+    """Poles of the model in the z plane with the unit circle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    found = result["model"]["poles"]
+    panels = Panels(1)
+    circle = style.values(np.cos(angle)), style.values(np.sin(angle))
+    panels.line(0, *circle, hoverinfo="skip", line={"color": style.FLOOR, "width": 1})
+    panels.line(
+        0,
+        style.values([p["real"] for p in found]),
+        style.values([p["imaginary"] for p in found]),
+        mode="markers",
+        marker={"symbol": "x", "size": 10, "color": [style.HORIZON if p["stable"] else style.FREE_RUN for p in found]},
+        text=[f"{p['natural_frequency_hz']:.3g} Hz, damping {p['damping']:.2f}" for p in found],
+        hoverinfo="text+x+y",
+    )
+    panels.x_axis(0, "real")
+    panels.y_axis(0, "imaginary", scaleanchor="x")
+    return panels.figure(300, hovermode="closest")

@@ -1,0 +1,127 @@
+"""What all figures share: colours that read on light and dark pages, units, panels, a neutral layout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from hydraulic_sysid.display import SHOWN
+
+Array = NDArray[np.float32]
+
+# After Okabe & Ito's palette for colour-blind readers, lightened where it would sink on a dark page.
+MEASURED = "#8b93a1"
+FREE_RUN = "#e0662a"
+HORIZON = "#3a8fd0"
+ONE_STEP = "#2fa37c"
+FLOOR = "#8b93a1"
+BAND = "rgba(58,143,208,0.22)"
+FLOOR_BAND = "rgba(139,147,161,0.25)"
+_GRID = "rgba(128,138,150,0.22)"
+_FRAME = "rgba(128,138,150,0.45)"
+_TEXT = "#7b8490"
+_AXIS = {"gridcolor": _GRID, "zerolinecolor": _FRAME, "linecolor": _FRAME, "showline": True, "mirror": True}
+
+
+def values(data: Any, factor: float = 1.0) -> Array:
+    """A document's list as an array for a trace; single precision is finer than a screen, null becomes NaN."""
+    return (np.asarray(data, dtype=float) * factor).astype(np.float32)
+
+
+def shown(unit: str) -> tuple[float, str]:
+    """Factor to and name of the unit on the page; an unknown unit is shown as it is."""
+    return SHOWN.get(unit, (1.0, unit))
+
+
+@dataclass
+class Panels:
+    """Panels of one figure in rows and columns, gathered as plain dictionaries.
+
+    (Plotly's own figure methods check every call against its whole schema, which takes longer than comparing
+    the records.) With ``one_time`` all panels are stacked on one x axis, so that zooming and hovering act on
+    all.
+    """
+
+    rows: int
+    columns: int = 1
+    heights: list[float] | None = None
+    gap: tuple[float, float] = (0.0, 0.0)
+    """Between columns and between rows, as parts of the figure."""
+    titles: list[str] = field(default_factory=list)
+    one_time: bool = False
+    traces: list[dict[str, Any]] = field(default_factory=list)
+    shapes: list[dict[str, Any]] = field(default_factory=list)
+    annotations: list[dict[str, Any]] = field(default_factory=list)
+    axes: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        weights = np.asarray(self.heights or [1.0] * self.rows)
+        wide = (1.0 - self.gap[0] * (self.columns - 1)) / self.columns
+        tall = (1.0 - self.gap[1] * (self.rows - 1)) * weights / weights.sum()
+        for panel in range(self.rows * self.columns):
+            row, column = divmod(panel, self.columns)
+            top = 1.0 - float(tall[:row].sum()) - self.gap[1] * row
+            left = column * (wide + self.gap[0])
+            x, y = self._names(panel)
+            height = [max(0.0, top - float(tall[row])), top]
+            self.axes[f"yaxis{y[1:]}"] = {**_AXIS, "domain": height, "anchor": x, "title": {"standoff": 6}}
+            self.axes[f"xaxis{x[1:]}"] = {**_AXIS, "domain": [left, left + wide], "anchor": y, "title": {"standoff": 4}}
+            if panel < len(self.titles):
+                self.annotations.append(
+                    {"text": self.titles[panel], "x": left + wide / 2, "y": top, "xref": "paper", "yref": "paper",
+                     "xanchor": "center", "yanchor": "bottom", "showarrow": False, "font": {"size": 13}}
+                )  # fmt: skip
+
+    def line(self, panel: int, x: Array, y: Array, name: str = "", legend: bool = False, **trace: Any) -> None:
+        """Add a trace; a line unless ``mode`` or ``type`` says otherwise. Equal names hide together."""
+        axis_x, axis_y = self._names(panel)
+        kind = {} if "type" in trace else {"type": "scatter", "mode": "lines"}
+        self.traces.append(
+            {**kind, "x": x, "y": y, "name": name, "legendgroup": name or None,
+             "showlegend": legend, "xaxis": axis_x, "yaxis": axis_y, **trace}
+        )  # fmt: skip
+
+    def band(self, panel: int, low: float, high: float) -> None:
+        """A grey band across a panel."""
+        x, y = self._names(panel)
+        self.shapes.append(
+            {"type": "rect", "xref": f"{x} domain", "yref": y, "x0": 0, "x1": 1, "y0": low, "y1": high,
+             "fillcolor": FLOOR_BAND, "line": {"width": 0}, "layer": "below"}
+        )  # fmt: skip
+
+    def x_axis(self, panel: int, title: str = "", **settings: Any) -> None:
+        """Title and settings of a panel's x axis."""
+        self._set(f"xaxis{self._names(panel)[0][1:]}", title, settings)
+
+    def y_axis(self, panel: int, title: str = "", **settings: Any) -> None:
+        """Title and settings of a panel's y axis."""
+        self._set(f"yaxis{self._names(panel)[1][1:]}", title, settings)
+
+    def figure(self, height: int, **layout: Any) -> go.Figure:
+        """The figure; its background is transparent, so that the page decides on light or dark."""
+        common = {
+            "height": height,
+            "margin": {"l": 66, "r": 14, "t": 34, "b": 44},
+            "paper_bgcolor": "rgba(0,0,0,0)",
+            "plot_bgcolor": "rgba(0,0,0,0)",
+            "font": {"family": "system-ui, sans-serif", "size": 12, "color": _TEXT},
+            "legend": {"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom", "xanchor": "left"},
+            "hovermode": "x",
+            "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": _FRAME, "activecolor": HORIZON},
+            "shapes": self.shapes,
+            "annotations": self.annotations,
+        }
+        return go.Figure({"data": self.traces, "layout": {**common, **self.axes, **layout}})
+
+    def _names(self, panel: int) -> tuple[str, str]:
+        number = "" if panel == 0 else str(panel + 1)
+        return ("x" if self.one_time else f"x{number}"), f"y{number}"
+
+    def _set(self, axis: str, title: str, settings: dict[str, Any]) -> None:
+        if title:
+            self.axes[axis]["title"]["text"] = title
+        self.axes[axis].update(settings)

@@ -1,0 +1,121 @@
+"""ARX models recover known systems, and their figures mean what they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from hydraulic_sysid.arx import ArxOrder, IdentificationError, fit_arx
+
+A = np.array([-1.5, 0.7, -0.05])
+B = np.array([0.4, -0.2, 0.1])
+
+
+def system(u: np.ndarray, nk: int, noise: float, seed: int, constant: float = 0.0) -> np.ndarray:
+    e = noise * np.random.default_rng(seed).standard_normal(u.size)
+    den = np.concatenate(([1.0], A))
+    return lfilter(np.concatenate((np.zeros(nk), B)), den, u) + lfilter([1.0], den, e + constant)
+
+
+def excite(n: int = 4000, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(n)
+
+
+@pytest.mark.parametrize("nk", [0, 1, 3])
+def test_noise_free_system_is_recovered(nk: int) -> None:
+    u = excite()
+    model = fit_arx([u], [system(u, nk, 0.0, 1)], 0.05, ArxOrder(3, 3, nk))
+    assert np.allclose(model.a, A, atol=1e-8)
+    assert np.allclose(model.b, B, atol=1e-8)
+    assert model.loss < 1e-18
+
+
+def test_standard_errors_cover_the_truth() -> None:
+    """Over repeated experiments the parameters scatter by what the standard errors say."""
+    theta, claimed = [], []
+    for seed in range(60):
+        u = excite(800, seed)
+        model = fit_arx([u], [system(u, 1, 0.3, seed + 1000)], 0.05, ArxOrder(3, 3, 1))
+        theta.append(np.concatenate((model.a, model.b)))
+        claimed.append(model.standard_errors[:6])
+    scatter = np.std(theta, axis=0, ddof=1)
+    assert np.allclose(np.mean(claimed, axis=0), scatter, rtol=0.35)
+    assert model.loss == pytest.approx(0.09, rel=0.15)
+
+
+def test_constant_is_estimated_and_removed_offsets_give_the_same_dynamics() -> None:
+    u = excite() + 0.8
+    y = system(u, 1, 0.01, 5, constant=0.3)
+    estimated = fit_arx([u], [y], 0.05, ArxOrder(3, 3, 1), "estimate")
+    removed = fit_arx([u], [y], 0.05, ArxOrder(3, 3, 1), "remove")
+    ignored = fit_arx([u], [y], 0.05, ArxOrder(3, 3, 1), "none")
+    assert estimated.constant == pytest.approx(0.3, abs=0.02)
+    assert np.allclose(estimated.a, A, atol=0.01)
+    assert np.allclose(removed.a, A, atol=0.02)
+    assert ignored.loss > 5 * estimated.loss
+
+
+def test_several_experiments_are_not_glued_together() -> None:
+    """A jump between two records must not look like dynamics."""
+    u1, u2 = excite(500, 1), excite(500, 2)
+    y1, y2 = system(u1, 1, 0.0, 3), system(u2, 1, 0.0, 4)
+    y2 = y2 + lfilter([1.0], np.concatenate(([1.0], A)), np.concatenate(([50.0], np.zeros(499))))
+    model = fit_arx([u1, u2], [y1, y2], 0.05, ArxOrder(3, 3, 1))
+    assert np.allclose(model.a, A, atol=1e-8)
+
+
+def test_free_run_finds_the_initial_state_and_prediction_needs_a_past() -> None:
+    u = excite(600)
+    y = system(u, 1, 0.0, 1)
+    model = fit_arx([u], [y], 0.05, ArxOrder(3, 3, 1))
+    part = slice(200, 600)
+    assert np.allclose(model.simulate(u[part], y[part]), y[part], atol=1e-6)
+    assert np.abs(model.simulate(u[part]) - y[part])[:3].max() > 1e-3
+    one = model.predict(u[part], y[part])
+    assert np.isnan(one[:3]).all()
+    assert np.allclose(one[3:], y[part][3:], atol=1e-8)
+
+
+def test_transfer_function_is_what_python_control_takes() -> None:
+    control = pytest.importorskip("control")
+    u = excite(300)
+    for nk in (0, 1, 3):
+        model = fit_arx([u], [system(u, nk, 0.0, 1)], 0.05, ArxOrder(3, 3, nk))
+        num, den = model.transfer_function()
+        response = control.forced_response(control.TransferFunction(num, den, 0.05), inputs=u)
+        assert np.allclose(np.squeeze(response.outputs), system(u, nk, 0.0, 1), atol=1e-6)
+
+
+def test_poles_of_a_known_oscillator_and_integrator() -> None:
+    dt, wn, zeta = 0.01, 2 * np.pi * 4.0, 0.2
+    s = wn * (-zeta + 1j * np.sqrt(1 - zeta**2))
+    den = np.real(np.poly([1.0, np.exp(s * dt), np.exp(np.conj(s) * dt)]))
+    u = excite(4000)
+    model = fit_arx([u], [lfilter([0.0, 0.1, 0.2, 0.1], den, u)], dt, ArxOrder(3, 3, 1))
+    slow, *pair = model.poles()
+    assert slow.z == pytest.approx(1.0, abs=1e-6)
+    assert slow.natural_frequency < 1e-3
+    for pole in pair:
+        assert pole.natural_frequency == pytest.approx(4.0, rel=1e-4)
+        assert pole.damping == pytest.approx(zeta, rel=1e-3)
+        assert pole.stable
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "word"),
+    [
+        (np.zeros(100), np.ones(100), "zero throughout"),
+        (np.ones(100), np.ones(100), "excite"),
+        (np.ones(8), np.ones(8), "too few"),
+        (np.ones(8), np.ones(9), "equal"),
+    ],
+)
+def test_data_that_cannot_identify_say_why(u: np.ndarray, y: np.ndarray, word: str) -> None:
+    with pytest.raises(IdentificationError, match=word):
+        fit_arx([u], [y], 0.05, ArxOrder(3, 3, 1))
+
+
+def test_order_is_checked() -> None:
+    with pytest.raises(IdentificationError, match="na and nb"):
+        ArxOrder(0, 1, 1)

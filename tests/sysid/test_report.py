@@ -1,0 +1,180 @@
+"""The page shows what the documents hold, needs nothing else, and the documents survive the way to disk and back."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hydraulic_sim.model_file import load_model
+from hydraulic_sysid import results
+from hydraulic_sysid.compare import compare
+from hydraulic_sysid.identification import identify
+from hydraulic_sysid.records import read_all
+from hydraulic_sysid.report import compare_figures, identify_figures, render, write_page
+
+SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run's folder with both results of two sample records."""
+    run = tmp_path_factory.mktemp("run")
+    records = read_all([SAMPLE / "triangle.csv.gz", SAMPLE / "steps.csv.gz"])
+    results.write_result(run, identify(records))
+    results.write_result(run, compare(load_model("sample_bench"), records))
+    write_page(run, results.read_folder(run))
+    return run
+
+
+@pytest.fixture(scope="module")
+def comparison(folder: Path) -> dict[str, Any]:
+    return results.read_result(folder / "compare.json")
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def trace_values(data: dict[str, Any]) -> np.ndarray:
+    assert data["dtype"] == "f4"
+    return np.frombuffer(base64.b64decode(data["bdata"]), dtype="<f4")
+
+
+def test_page_needs_no_other_file_and_no_network(page: str) -> None:
+    head = page[: page.index("<script>")]
+    assert not re.search(r"""(src|href)\s*=\s*["']""", head)
+    assert "<link" not in head
+    assert not re.search(r"<script[^>]+src=", page)
+    assert page.count("plotly.js v") == 1
+    assert len(page) < 12e6
+
+
+def test_page_says_the_verdicts_and_every_finding(page: str, comparison: dict[str, Any], folder: Path) -> None:
+    identification = results.read_result(folder / "identify.json")
+    for text in [comparison["verdict"]["text"], identification["verdict"]["text"]]:
+        assert text in page
+    for finding in comparison["findings"]:
+        assert finding["text"] in page
+
+
+def test_every_figure_has_its_place_and_its_data(page: str) -> None:
+    places = re.findall(r'data-figure="([^"]+)"', page)
+    data = re.findall(r'<script type="application/json" id="([^"]+)">', page)
+    assert sorted(places) == sorted(data)
+    assert len(places) == len(set(places)) > 20
+    for spec in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', page, flags=re.S):
+        assert json.loads(spec.replace("<\\/", "</"))["data"]
+
+
+def test_curves_are_those_of_the_document(comparison: dict[str, Any]) -> None:
+    figure = json.loads(compare_figures.overlay(comparison, 0).to_json())
+    measured = next(t for t in figure["data"] if t["name"] == "measured")
+    stored = comparison["records"][0]["traces"]["position"]["measured"]
+    assert np.allclose(trace_values(measured["y"]), 1e3 * np.array(stored["value"]), rtol=1e-6)
+    assert np.allclose(trace_values(measured["x"]), stored["time"], rtol=1e-6)
+
+
+def test_figures_carry_units_and_share_time(comparison: dict[str, Any]) -> None:
+    figure = compare_figures.overlay(comparison, 0)
+    titles = [figure.layout[k].title.text for k in figure.layout if k.startswith("yaxis")]
+    assert {"position<br>[mm]", "velocity<br>[mm/s]", "pressure A<br>[MPa]", "drive<br>[V]"} <= set(titles)
+    assert {t.xaxis for t in figure.data} == {"x"}
+    maps = compare_figures.error_maps(comparison, "velocity")
+    assert maps.layout.yaxis.title.text == "error [mm/s]"
+
+
+def test_every_figure_function_makes_one(comparison: dict[str, Any], folder: Path) -> None:
+    identification = results.read_result(folder / "identify.json")
+    made = [
+        compare_figures.spectra(comparison, 0),
+        compare_figures.growth(comparison, 1),
+        *(compare_figures.error_maps(comparison, c, r) for c in comparison["channels"] for r in (None, 0, 1)),
+        identify_figures.overlay(identification, "validation", 0),
+        identify_figures.residual_tests(identification, "estimation", 0),
+        identify_figures.poles(identification),
+    ]
+    assert all(f.data for f in made)
+
+
+def test_names_from_the_document_cannot_become_html(comparison: dict[str, Any]) -> None:
+    hostile = json.loads(json.dumps(comparison))
+    hostile["model"]["name"] = "</title><script>alert(1)</script>"
+    hostile["records"][0]["name"] = "</script><b>x"
+    html = render([hostile])
+    assert "<script>alert(1)" not in html
+    assert "</script><b>x" not in html
+
+
+def test_document_has_no_number_that_json_does_not_know(folder: Path) -> None:
+    def refuse(word: str) -> None:
+        raise AssertionError(word)
+
+    for name in ("compare.json", "identify.json"):
+        json.loads((folder / name).read_text(), parse_constant=refuse)
+
+
+def test_plain_keeps_precision_where_it_matters() -> None:
+    slow = results.plain({"pole": 0.99999912345, "trace": np.full(100, 1.23456789), "gap": np.array([1.0, np.nan])})
+    assert slow["pole"] == 0.99999912345
+    assert slow["trace"][0] == 1.23457
+    assert slow["gap"] == [1.0, None]
+
+
+def test_own_files_are_replaced_and_others_kept(tmp_path: Path, comparison: dict[str, Any]) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "settings.json").write_text("{}")
+    for _ in range(2):
+        results.write_result(tmp_path, comparison)
+        write_page(tmp_path, results.read_folder(tmp_path))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["compare.json", "notes.txt", "report.html", "settings.json"]
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+def test_foreign_files_are_not_written_over(tmp_path: Path, comparison: dict[str, Any]) -> None:
+    (tmp_path / "compare.json").write_text('{"mine": 1}')
+    with pytest.raises(results.ResultError, match="schema is None"):
+        results.write_result(tmp_path, comparison)
+    assert (tmp_path / "compare.json").read_text() == '{"mine": 1}'
+    (tmp_path / "compare.json").unlink()
+    (tmp_path / "report.html").write_text("<html>mine</html>")
+    with pytest.raises(results.ResultError, match="not a page of this project"):
+        results.check_target(tmp_path, "compare")
+
+
+def test_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "compare.json"
+    results.write_text(path, "old")
+    with pytest.raises(UnicodeEncodeError):
+        results.write_text(path, "new \udc80")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [("nonsense", "not a JSON"), ('{"schema": "other/1"}', "schema is 'other/1'"), ("[1]", "schema is None")],
+)
+def test_unreadable_results_are_named(tmp_path: Path, content: str, word: str) -> None:
+    path = tmp_path / "x.json"
+    path.write_text(content)
+    with pytest.raises(results.ResultError, match=word):
+        results.read_result(path)
+
+
+def test_unknown_version_is_refused(comparison: dict[str, Any]) -> None:
+    with pytest.raises(results.ResultError, match="compare/99"):
+        render([{**comparison, "schema": "hydraulic_sysid.compare/99"}])
+
+
+def test_folder_without_results_says_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(results.ResultError, match="run compare or identify"):
+        results.read_folder(tmp_path)
+    with pytest.raises(results.ResultError, match="does not exist"):
+        results.read_folder(tmp_path / "nowhere")
