@@ -1,0 +1,25 @@
+"""Whether a stream has come without gaps, by the numbers its publisher gives the messages."""
+
+from __future__ import annotations
+
+
+class Continuity:
+    """Counts what is missing in one topic; judges only while it has exactly one publisher."""
+
+    def __init__(self) -> None:
+        self.missing = 0
+        self._last = 0
+        self._publishers = 0
+
+    def publishers_are(self, count: int) -> None:
+        """How many publishers there are; numbers of different ones cannot be compared."""
+        if count != self._publishers:
+            self._publishers = count
+            self._last = 0
+
+    def take(self, number: int) -> None:
+        """A message with this number has come."""
+        # A number that went back is a publisher that was started anew.
+        if self._publishers == 1 and 0 < self._last < number - 1:
+            self.missing += number - self._last - 1
+        self._last = number

@@ -1,0 +1,64 @@
+"""The recorder's row on `/diagnostics`."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+from hydraulic_interfaces.contract import topic
+from hydraulic_interfaces.conversions import to_time
+from hydraulic_interfaces.qos import profile
+from hydraulic_sysid.bag import Recording
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+# Ten seconds of the five streams at 1 kHz: the disk is not keeping up.
+_QUEUE_WARNING = 50_000
+
+
+class RecorderHealth:
+    """Builds the diagnostics; rates are over the time since the last message."""
+
+    def __init__(self, node: Node, recording: Recording) -> None:
+        self._name, self._recording = node.get_fully_qualified_name(), recording
+        self._publisher = node.create_publisher(DiagnosticArray, topic("diagnostics"), profile("diagnostics"))
+        self._then = 0
+        self._before: dict[str, int] = {}
+        self._missing = 0
+
+    def publish(self, state: str, missing: dict[str, int], now_ns: int) -> None:
+        """Tell how things are; `missing` as of `Intake.missing`."""
+        recording = self._recording
+        received = dict(recording.received)
+        elapsed = (now_ns - self._then) * 1e-9
+        values: dict[str, object] = {
+            "output": recording.folder,
+            "received": sum(received.values()),
+            "received_bytes": recording.bytes,
+            "queued": recording.waiting,
+            "missing": sum(missing.values()),
+        }
+        if self._then and elapsed > 0:
+            for topic, count in received.items():
+                values[f"rate_Hz {topic}"] = f"{(count - self._before.get(topic, 0)) / elapsed:.1f}"
+        values.update({f"missing {topic}": count for topic, count in missing.items()})
+        self._then, self._before = now_ns, received
+        level, text = self._judge(state, sum(missing.values()))
+        status = DiagnosticStatus(
+            level=level,
+            name=f"{self._name}: recording",
+            message=text,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = to_time(now_ns)
+        self._publisher.publish(array)
+
+    def _judge(self, state: str, missing: int) -> tuple[bytes, str]:
+        more, self._missing = missing - self._missing, missing
+        if self._recording.error is not None:
+            return ERROR, f"cannot write: {self._recording.error}"
+        if more > 0:
+            return WARN, f"{more} messages did not come"
+        if self._recording.waiting > _QUEUE_WARNING:
+            return WARN, f"{self._recording.waiting} messages wait for the disk"
+        return OK, state

@@ -1,0 +1,63 @@
+"""The recorder's ears: a subscription to every topic of the contract, emptied into a recording."""
+
+from __future__ import annotations
+
+import time
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
+
+from hydraulic_interfaces.contract import TOPICS, Topic, absolute, topic
+from hydraulic_interfaces.conversions import interface_class
+from hydraulic_interfaces.nodes.mailbox import Mailbox
+from hydraulic_interfaces.qos import profile
+from hydraulic_sysid.bag import BagTopic, ExperimentLog, Recording, message_type, offered_qos
+from hydraulic_sysid.bag.continuity import Continuity
+
+# Messages of a topic that wait while this process is held up: five seconds at 1 kHz.
+_DEPTH = 5000
+
+
+class _Channel:
+    """One topic: its subscription, its row in the bag, its gaps."""
+
+    def __init__(self, node: Node, row: Topic) -> None:
+        name, offered = absolute(row.name), profile(row.qos)
+        latched = offered.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        self.topic = BagTopic(name, message_type(row.type), (offered_qos(offered.depth, latched),))
+        self.box = Mailbox(node, interface_class(row.type), name, profile(row.qos, _DEPTH), raw=True)
+        self.continuity = Continuity()
+
+
+class Intake:
+    """Takes what has come on all topics; all calls must come from one thread."""
+
+    def __init__(self, node: Node, recording: Recording) -> None:
+        self._recording = recording
+        self._channels = [_Channel(node, row) for row in TOPICS]
+        self._experiment_topic = topic("experiment")
+        self.experiment = ExperimentLog()
+
+    def drain(self) -> None:
+        """Queue every waiting message for writing."""
+        append = self._recording.append
+        for channel in self._channels:
+            bag_topic, continuity = channel.topic, channel.continuity
+            continuity.publishers_are(channel.box.publishers)
+            for data, info in channel.box.take_with_info():
+                number = info["publication_sequence_number"] or 0
+                received = info["received_timestamp"] or time.time_ns()
+                append(bag_topic, data, received, info["source_timestamp"] or 0, number)
+                continuity.take(number)
+                if bag_topic.name == self._experiment_topic:
+                    self.experiment.take(data)
+
+    def publishers(self) -> dict[str, int]:
+        """Publishers that each topic is connected with, where there are any."""
+        counts = {channel.topic.name: channel.box.publishers for channel in self._channels}
+        return {name: count for name, count in counts.items() if count}
+
+    def missing(self) -> dict[str, int]:
+        """Messages that did not come, of the topics where some did not."""
+        lost = {channel.topic.name: channel.continuity.missing for channel in self._channels}
+        return {name: count for name, count in lost.items() if count}

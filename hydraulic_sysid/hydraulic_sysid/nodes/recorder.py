@@ -1,0 +1,152 @@
+"""Node `/actuator/recorder`: every topic of the contract, serialised as it comes, into a rosbag2 folder.
+
+`~/status` (latched JSON) says "recording" once the bag is open and the subscriptions are up, with the publishers
+they are connected with, and "closed" once the bag is finished, with the number of messages per topic.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.exceptions import ParameterException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from std_msgs.msg import String
+
+from hydraulic_interfaces.contract import NAMESPACE, RECORDER_NODE
+from hydraulic_interfaces.nodes.parameters import ParameterTable
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_interfaces.qos import profile
+from hydraulic_sysid.bag import Recording, StopRule
+from hydraulic_sysid.nodes._recorder_health import RecorderHealth
+from hydraulic_sysid.nodes._recorder_intake import Intake
+
+PARAMETERS = (
+    ParameterSpec("output", "", "folder of the bag; it must not exist yet"),
+    ParameterSpec("description", "", "free text that goes into the bag's metadata"),
+    ParameterSpec("max_duration", 0.0, "close the bag after this time; 0: never", "s", 0.0, 1e6),
+    ParameterSpec("stop_on_experiment_end", False, "close when the excitation has finished or aborted its run"),
+    ParameterSpec("exit_when_done", False, "leave once the bag is closed"),
+)
+_POLL_S = 0.02
+_STATUS_S = 0.2
+_DIAGNOSTICS_S = 1.0
+_ACKNOWLEDGE_S = 1.0
+
+
+class Recorder(Node):
+    """Opens the bag at once and records until `close`; `poll` does the work, some fifty times a second."""
+
+    def __init__(self) -> None:
+        """:raises BagError: the output folder exists, or cannot be made.
+
+        :raises ValueError: no output folder is given.
+        """
+        super().__init__(RECORDER_NODE, namespace=NAMESPACE)
+        values = ParameterTable(self, PARAMETERS, locked=lambda: True).values()
+        if not values["output"]:
+            raise ValueError("output: no folder given; use --ros-args -p output:=FOLDER")
+        self._status = self.create_publisher(String, "~/status", profile("latched"))
+        self._exit_when_done = values["exit_when_done"]
+        self._rule = StopRule(values["max_duration"], values["stop_on_experiment_end"])
+        custom = {"recorder": "hydraulic_sysid", "description": values["description"]}
+        self._recording = Recording(Path(values["output"]).expanduser().absolute(), custom)
+        self._intake = Intake(self, self._recording)
+        self._health = RecorderHealth(self, self._recording)
+        self.state = ""
+        self._published = ""
+        self._due = {_POLL_S: 0.0, _STATUS_S: 0.0, _DIAGNOSTICS_S: 0.0}
+
+    @property
+    def done(self) -> bool:
+        """Whether the process may leave."""
+        return self.state == "failed" or (self.state == "closed" and self._exit_when_done)
+
+    def poll(self) -> None:
+        """Take what has come, see whether to close, tell how things are."""
+        if not self._is_due(_POLL_S):
+            return
+        clock = self.get_clock().now().nanoseconds
+        if self.state in ("", "recording"):
+            self._intake.drain()
+            reason = self._rule.reason(clock, time.monotonic_ns(), self._intake.experiment)
+            if reason or self._recording.error:
+                self.close(reason)
+            elif self._is_due(_STATUS_S):
+                self._tell("recording", publishers=self._intake.publishers())
+        if self._is_due(_DIAGNOSTICS_S):
+            self._health.publish(self.state, self._intake.missing(), clock)
+
+    def close(self, reason: str) -> None:
+        """Finish the bag, unless that has been done."""
+        if self.state in ("closed", "failed"):
+            return
+        self._intake.drain()
+        folder, missing = self._recording.folder, self._intake.missing()
+        try:
+            bag = self._recording.close(self._intake.experiment.custom_data())
+        except Exception as error:
+            self.get_logger().error(f"cannot write {folder}: {error}; to save what is there: recover {folder}")
+            self._tell("failed", error=str(error))
+        else:
+            figures = {"messages": bag.messages, "duration_s": bag.duration_ns * 1e-9, "bytes": bag.size}
+            self._tell("closed", reason=reason, missing=missing, **figures)
+            self.get_logger().info(f"closed {folder}: {sum(bag.messages.values())} messages ({reason})")
+        self._status.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGE_S))
+
+    def _is_due(self, period: float) -> bool:
+        due = time.monotonic() >= self._due[period]
+        if due:
+            self._due[period] = time.monotonic() + period
+        return due
+
+    def _tell(self, state: str, **content: Any) -> None:
+        self.state = state
+        text = json.dumps({"state": state, "output": str(self._recording.folder), **content})
+        if text != self._published:
+            self._published = text
+            self._status.publish(String(data=text))
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Record until the end condition, SIGINT or SIGTERM; 0 done, 1 not everything written, 2 bad options."""
+    arguments = sys.argv if argv is None else [sys.argv[0], *argv]
+    rows = "\n".join(f"  {s.name} = {s.default!r} {s.unit}: {s.description}" for s in PARAMETERS)
+    text = f"{__doc__}\nparameters (--ros-args -p name:=value):\n{rows}"
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_args(remove_ros_args(arguments)[1:])
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        node = Recorder()
+    except (ParameterException, ValueError) as error:
+        print(f"recorder: {error}", file=sys.stderr)
+        rclpy.try_shutdown()
+        return 2
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    while not (stop.is_set() or node.done):
+        executor.spin_once(timeout_sec=_POLL_S)
+        node.poll()
+    node.close("signal")
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.try_shutdown()
+    return 1 if node.state == "failed" else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
