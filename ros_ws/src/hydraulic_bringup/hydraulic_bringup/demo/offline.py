@@ -1,0 +1,56 @@
+"""The half of the demo that needs no graph: identify, compare, and one page for both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hydraulic_sim.model import Model
+from hydraulic_sysid import arx, identification, results
+from hydraulic_sysid.compare import ComparisonError, Settings, compare
+from hydraulic_sysid.records import Record
+from hydraulic_sysid.report import write_page
+
+from .errors import DemoError
+from .online import Steps
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The two result documents (None where one could not be made, with the reason) and the page."""
+
+    identified: dict[str, Any] | None
+    compared: dict[str, Any]
+    page: Path
+    left_out: str = ""
+
+
+def analyse(records: list[Record], held_out: list[Record], model: Model, out: Path, steps: Steps) -> Analysis:
+    """Identify on ``records`` (validated on ``held_out``, or on the last fifth), compare the model with all of them.
+
+    Raises `DemoError`.
+    """
+    steps.begin("identify", 2.0)
+    identified, left_out = None, ""
+    try:
+        # A record sampled more slowly than usual is identified at its own sampling time.
+        sampling = max(identification.Settings().sampling_time, *(r.dt for r in records))
+        settings = identification.Settings(sampling_time=sampling)
+        identified = identification.identify(records, held_out or None, settings)
+        results.write_result(out, identified)
+    except arx.IdentificationError as error:
+        left_out = f"not identified: {error}"
+    steps.done()
+    every = [*records, *held_out]
+    steps.begin("compare", 3.0 + 2.0 * len(every))
+    try:
+        compared = compare(model, every, Settings(), lambda _: steps.tick())
+    except ComparisonError as error:
+        raise DemoError("compare", str(error), "give records with drive and position that are long enough") from None
+    results.write_result(out, compared)
+    steps.done()
+    steps.begin("report", 2.0)
+    page = write_page(out, results.read_folder(out))
+    steps.done()
+    return Analysis(identified, compared, page, left_out)

@@ -1,0 +1,150 @@
+"""The half of the demo that runs the graph: each experiment excites the plant and leaves a bag."""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Protocol
+
+from hydraulic_sysid.excitation import load_plan
+
+from .errors import DemoError
+from .processes import Child, Crew
+
+PLANTS = {"sim": "hydraulic_sim.nodes.simulator", "can": "hydraulic_can_driver.nodes.can_driver"}
+SENSORS = {
+    "position_noise": 20e-6,
+    "position_resolution": 24e-6,
+    "pressure_noise": 15e3,
+    "noise_seed": 1,
+}
+_START_S = 90.0  # the first start on a machine compiles the physics
+_STEP_S = 20.0
+
+
+class Steps(Protocol):
+    """What shows the progress: `begin` a step of so many seconds, `tick` now and then, `done`."""
+
+    def begin(self, text: str, seconds: float) -> None: ...
+
+    def tick(self) -> None: ...
+
+    def done(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One excitation plan (a file) and the name of its bag."""
+
+    name: str
+    plan: Path
+
+
+def run(plant: str, model: Path, experiments: Sequence[Experiment], out: Path, steps: Steps) -> list[Path]:
+    """Run the experiments on a plant and return their bags. Raises `DemoError`; ends every process it started."""
+    module = PLANTS[plant]
+    package = module.partition(".")[0]
+    if find_spec(package) is None or find_spec(f"{package}.nodes") is None or find_spec(module) is None:
+        raise DemoError("plant", f"plant {plant!r} is not there: no module {module}", "use --plant sim")
+    with private_domain() as env, Crew(out / "logs", env) as crew:
+        client_class = import_module("hydraulic_bringup.nodes._graph_client").GraphClient
+        with client_class() as client:
+            simulator = _start_plant(crew, client, plant, module, model, steps)
+            bags = [_experiment(crew, client, experiment, out, steps) for experiment in experiments]
+            steps.begin("stop the plant", 1.0)
+            simulator.may_end = True
+            simulator.stop()
+            steps.done()
+    return bags
+
+
+@contextmanager
+def private_domain() -> Iterator[dict[str, str]]:
+    """The environment of a ROS domain of one's own on this machine; also set in this process meanwhile."""
+    changed = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "PYTHONUNBUFFERED": "1"}
+    before = {name: os.environ.get(name) for name in (*changed, "ROS_DOMAIN_ID")}
+    try:
+        with _free_domain() as number:
+            os.environ.update(changed, ROS_DOMAIN_ID=str(number))
+            yield dict(os.environ)
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
+def _free_domain() -> Iterator[int]:
+    """A domain that nobody else who asks the domain coordinator has; without it, one drawn at random."""
+    if find_spec("domain_coordinator") is None:
+        yield random.SystemRandom().randint(1, 100)
+        return
+    with import_module("domain_coordinator").domain_id() as number:
+        yield int(number)
+
+
+def _start_plant(crew: Crew, client, plant: str, module: str, model: Path, steps: Steps) -> Child:
+    steps.begin("start the plant", 3.0)
+    values = {"model": str(model), **SENSORS} if plant == "sim" else {"model": str(model)}
+    settings = [part for name, value in values.items() for part in ("-p", f"{name}:={value}")]
+    child = crew.start("plant", module, "--ros-args", *settings)
+    for transition in ("configure", "activate"):
+        if not client.change_state(transition, _START_S):
+            crew.check()
+            raise DemoError("plant", f"it did not {transition}; its last words:\n{child.tail()}", f"log: {child.log}")
+    problem = client.enable(_STEP_S)
+    if problem:
+        raise DemoError("plant", f"it was not enabled: {problem}", f"log: {child.log}")
+    steps.done()
+    return child
+
+
+def _experiment(crew: Crew, client, experiment: Experiment, out: Path, steps: Steps) -> Path:
+    seconds = load_plan(str(experiment.plan)).total_time
+    bag = (out / experiment.name).absolute()
+    steps.begin(f"{experiment.name}: start the recorder", 2.0)
+    recorder = crew.start(
+        f"recorder_{experiment.name}", "hydraulic_sysid.nodes.recorder", "--ros-args",
+        "-p", f"output:={bag}", "-p", "stop_on_experiment_end:=true", "-p", "exit_when_done:=true",
+    )  # fmt: skip
+    crew.wait(
+        lambda: client.recorder_status(str(bag)).get("state") == "recording",
+        f"{experiment.name}: recorder", _STEP_S, steps.tick,
+    )  # fmt: skip
+    steps.done()
+    steps.begin(f"{experiment.name}: excite and record", seconds + 2.0)
+    excitation = crew.start(
+        f"excitation_{experiment.name}", "hydraulic_sysid.nodes.excitation", "--ros-args",
+        "-p", f"plan:={experiment.plan}", "-p", "autostart:=true", "-p", "exit_when_done:=true",
+        "-p", f"start_timeout:={_STEP_S}", "-p", "listeners:=2",
+    )  # fmt: skip
+    recorder.may_end = excitation.may_end = True
+    crew.wait(
+        lambda: excitation.exit_code == 0 and recorder.exit_code == 0,
+        f"{experiment.name}: run", seconds + 2.0 * _STEP_S, steps.tick,
+    )  # fmt: skip
+    steps.done()
+    return bag
+
+
+def timestamped_folder(root: Path, name: str) -> Path:
+    """A new folder ``root/<date>-<time>-name``, and ``root/latest`` pointing to it."""
+    root.mkdir(parents=True, exist_ok=True)
+    folder = root / f"{time.strftime('%Y%m%d-%H%M%S')}-{name}"
+    folder.mkdir()
+    link = root / "latest"
+    if link.is_symlink() or not link.exists():
+        draft = root / f".latest.{os.getpid()}"
+        draft.unlink(missing_ok=True)
+        draft.symlink_to(folder.name)
+        draft.replace(link)
+    return folder

@@ -1,0 +1,84 @@
+"""A small node that drives the graph from outside: lifecycle, services, and what the recorder says."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from typing import Any
+
+import rclpy
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+
+from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service
+from hydraulic_interfaces.qos import profile
+
+
+class GraphClient:
+    """Context manager around a node with a thread of its own."""
+
+    def __enter__(self) -> GraphClient:
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        self._node = rclpy.create_node("bench_demo", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._status: dict[str, Any] = {}
+        self._node.create_subscription(String, f"{absolute(RECORDER_NODE)}/status", self._on_status, profile("latched"))
+        self._leaving = False
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._leaving = True
+        self._executor.wake()
+        self._thread.join(2.0)
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def _spin(self) -> None:
+        while not self._leaving:
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _on_status(self, message: String) -> None:
+        status = json.loads(message.data)
+        self._status[status["output"]] = status
+
+    def recorder_status(self, folder: str) -> dict[str, Any]:
+        """What the recorder has said last about a bag; empty before."""
+        return dict(self._status.get(folder, {}))
+
+    def change_state(self, label: str, patience: float) -> bool:
+        """Take the plant through a transition ("configure", "activate", …); whether it did it."""
+        request = ChangeState.Request()
+        request.transition = Transition(id=getattr(Transition, f"TRANSITION_{label.upper()}"))
+        answer = self._call(ChangeState, f"{absolute(PLANT_NODE)}/change_state", request, patience)
+        return answer is not None and bool(answer.success)
+
+    def enable(self, patience: float) -> str:
+        """Let commands through; empty, or why not."""
+        answer = self._call(SetBool, service("enable"), SetBool.Request(data=True), patience)
+        if answer is None:
+            return f"no answer within {patience:g} s"
+        return "" if answer.success else str(answer.message)
+
+    def _call(self, kind: Any, name: str, request: Any, patience: float) -> Any:
+        client = self._node.create_client(kind, name)
+        self._executor.wake()
+        deadline = time.monotonic() + patience
+        try:
+            if not client.wait_for_service(timeout_sec=patience):
+                return None
+            future = client.call_async(request)
+            self._executor.wake()
+            while not future.done() and time.monotonic() < deadline:
+                time.sleep(0.01)
+            return future.result() if future.done() else None
+        finally:
+            self._node.destroy_client(client)

@@ -1,0 +1,181 @@
+"""``demo``: the main job in one go, on the simulated actuator or on records of your own.
+
+Without options: a simulated actuator, built a little differently from its data sheet, is excited and recorded
+through the node graph; a linear model is identified; the data-sheet model is compared with the measurement; and
+a page says where it fails. With ``--record`` and ``--model`` the same from there on for records that exist.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from hydraulic_bringup.demo import offline, online
+from hydraulic_bringup.demo.errors import DemoError
+from hydraulic_sim.errors import HydraulicSimError
+from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.display import number, quantity
+from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_sysid.records import read_all
+
+DATA_SHEET = "moog_mcr_m_1002_bench"
+RUNS = Path("runs")
+_OFFLINE_S = 14.0
+SHOWN = ("position", "velocity", "load_pressure")  # channels of the table; all are in the report
+
+
+class ProgressSteps:
+    """Shows steps of known length as one bar; a plain line for each where there is no terminal."""
+
+    def __init__(self, console: Console, total_s: float) -> None:
+        columns = (SpinnerColumn(), TextColumn("{task.description:36}"), BarColumn(), TimeElapsedColumn())
+        self._console = console
+        self._bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._task = self._bar.add_task("", total=total_s)
+        self._before, self._length, self._begun, self._text = 0.0, 0.0, 0.0, ""
+
+    def __enter__(self) -> ProgressSteps:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def begin(self, text: str, seconds: float) -> None:
+        """A step that will take about so long."""
+        self._text, self._length, self._begun = text, seconds, time.monotonic()
+        self._bar.update(self._task, description=text)
+
+    def tick(self) -> None:
+        """Time goes by within the step."""
+        part = min((time.monotonic() - self._begun) / self._length, 0.98)
+        self._bar.update(self._task, completed=self._before + part * self._length)
+
+    def done(self) -> None:
+        """The step is finished."""
+        self._before += self._length
+        self._bar.update(self._task, completed=self._before)
+        self._console.print(f"  {self._text:36} {time.monotonic() - self._begun:5.1f} s", highlight=False)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the demo; 0 done, 1 a step failed, 2 bad options or input, 130 interrupted."""
+    options = _parser().parse_args(argv)
+    console = Console(highlight=False)
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        return _run(options, console)
+    except DemoError as error:
+        print(f"\ndemo failed at step {error.step!r}: {error.why}", file=sys.stderr)
+        if error.remedy:
+            print(error.remedy, file=sys.stderr)
+        return 1
+    except (HydraulicSimError, HydraulicSysidError, OSError) as error:
+        print(f"demo: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("\ninterrupted; every process of the demo has been stopped", file=sys.stderr)
+        return 130
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="demo", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--record", nargs="+", metavar="PATH", help="records that exist: bag, CSV, MAT, or a folder of such"
+    )
+    parser.add_argument("--columns", metavar="MAP", help="column map of CSV and MAT records")
+    parser.add_argument(
+        "--model", metavar="FILE", default=DATA_SHEET, help=f"model file or preset (default {DATA_SHEET})"
+    )
+    parser.add_argument("--plant", choices=tuple(online.PLANTS), default="sim", help="what is excited (default sim)")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="new folder of the run (default runs/<date>-demo)")
+    parser.add_argument("--quick", action="store_true", help="experiments of a few seconds")
+    return parser
+
+
+def _run(options: argparse.Namespace, console: Console) -> int:
+    model = load_model(options.model)
+    if options.record:
+        records, held_out = read_all([Path(p) for p in options.record], options.columns), []
+    out = _folder(options.out)
+    begun = time.monotonic()
+    if options.record:
+        console.print(f"comparing {model.name} with {len(records)} record(s); results in {out}")
+        with ProgressSteps(console, _OFFLINE_S) as steps:
+            analysis = offline.analyse(records, held_out, model, out, steps)
+    else:
+        files = resources.files("hydraulic_bringup.demo")
+        kind = "quick" if options.quick else "full"
+        experiments = [
+            online.Experiment(name, Path(str(files / "plans" / f"{kind}_{name}.yaml")))
+            for name in ("chirp", "multisine")
+        ]
+        as_built = Path(str(files / "models" / "as_built.yaml"))
+        console.print(f"exciting a simulated actuator, comparing it with {model.name}; results in {out}")
+        with ProgressSteps(console, 70.0 if kind == "full" else 35.0) as steps:
+            bags = online.run(options.plant, as_built, experiments, out, steps)
+            records, held_out = (read_all([bag]) for bag in bags)
+            analysis = offline.analyse(records, held_out, model, out, steps)
+    _print(analysis, console)
+    console.print(f"\n{time.monotonic() - begun:.0f} s. Open the report: [bold]{analysis.page}[/bold]", soft_wrap=True)
+    return 0
+
+
+def _folder(wanted: Path | None) -> Path:
+    if wanted is None:
+        return online.timestamped_folder(RUNS, "demo")
+    if wanted.exists() and (not wanted.is_dir() or any(wanted.iterdir())):
+        raise FileExistsError(f"--out {wanted}: it exists and is not empty; name a new folder")
+    wanted.mkdir(parents=True, exist_ok=True)
+    return wanted
+
+
+def _print(analysis: offline.Analysis, console: Console) -> None:
+    compared = analysis.compared
+    channels: dict[str, Any] = {n: c for n, c in compared["channels"].items() if n in SHOWN}
+    ahead = f"{compared['settings']['horizon']:g} s ahead"
+    table = Table(title=f"RMS error of {compared['model']['name']} {ahead}", title_justify="left")
+    table.add_column("record", no_wrap=True)
+    for channel in channels.values():
+        table.add_column(channel["title"], justify="right")
+    for record in compared["records"]:
+        figures = [record["channels"].get(name, {}).get("horizon") for name in channels]
+        cells = [_cell(f, c["unit"]) for f, c in zip(figures, channels.values(), strict=True)]
+        table.add_row(record["name"], *cells)
+    noise = [compared["summary"][name]["noise"] for name in channels]
+    table.add_section()
+    table.add_row("noise", *(quantity(n, c["unit"]) for n, c in zip(noise, channels.values(), strict=True)))
+    console.print(table)
+    if analysis.identified is not None:
+        console.print(analysis.identified["verdict"]["text"])
+    if analysis.left_out:
+        console.print(analysis.left_out)
+    console.print(compared["verdict"]["text"])
+
+
+def _cell(figures: dict[str, Any] | None, unit: str) -> str:
+    """An error, and how many times the error of an exact model under the same noise it is."""
+    if figures is None:
+        return "–"
+    exact = figures.get("exact_rmse")
+    times = f" ({number(figures['rmse'] / exact)} x exact)" if exact else ""
+    return f"{quantity(figures['rmse'], unit)}{times}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

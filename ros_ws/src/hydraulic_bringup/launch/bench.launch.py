@@ -1,0 +1,86 @@
+"""The bench: a plant (simulated or on CAN), and on request a recorder and an excitation.
+
+    ros2 launch hydraulic_bringup bench.launch.py plant:=sim
+    ros2 launch hydraulic_bringup bench.launch.py plant:=sim record:=/tmp/bag experiment:=chirp
+
+The plant is configured and activated; it moves nothing until `enable` is called (or enable:=true is given).
+"""
+
+from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
+from launch.events import matches_action
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import LifecycleNode, Node
+from launch_ros.event_handlers import OnStateTransition
+from launch_ros.events.lifecycle import ChangeState
+from launch_ros.substitutions import FindPackageShare
+from lifecycle_msgs.msg import Transition
+
+from launch import LaunchDescription
+
+PLANTS = {"sim": ("hydraulic_sim", "simulator"), "can": ("hydraulic_can_driver", "can_driver")}
+
+ARGUMENTS = (
+    ("plant", "sim", "what serves the topics: sim (simulated actuator) or can (CAN driver)"),
+    ("model", "moog_mcr_m_1002_bench", "model file or preset of the simulated actuator"),
+    ("params", "", "parameter file (default: config/bench.yaml of this package)"),
+    ("enable", "false", "let commands through as soon as the plant is active"),
+    ("record", "", "folder of a new bag; empty: nothing is recorded"),
+    ("experiment", "", "excitation plan (file or shipped name) to play; empty: none"),
+)
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Arguments first, then the nodes that they ask for."""
+    declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
+    return LaunchDescription([*declared, OpaqueFunction(function=_nodes)])
+
+
+def _nodes(context, *_args, **_kwargs):
+    value = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
+    if value["plant"] not in PLANTS:
+        raise RuntimeError(f"plant:={value['plant']}: allowed are {', '.join(PLANTS)}")
+    package, executable = PLANTS[value["plant"]]
+    file = value["params"] or PathJoinSubstitution([FindPackageShare("hydraulic_bringup"), "config", "bench.yaml"])
+    settings = {"enable_on_activate": value["enable"].lower() in ("true", "1", "yes")}
+    if value["plant"] == "sim":
+        settings["model"] = value["model"]
+    plant = LifecycleNode(
+        package=package,
+        executable=executable,
+        name="plant",
+        namespace="/actuator",
+        parameters=[file, settings],
+        output="screen",
+    )
+    actions = [plant, *_brought_up(plant)]
+    if value["record"]:
+        settings = {"output": value["record"], "stop_on_experiment_end": bool(value["experiment"])}
+        actions.append(_node("recorder", settings))
+    if value["experiment"]:
+        settings = {"plan": value["experiment"], "autostart": True, "listeners": 2 if value["record"] else 1}
+        actions.append(_node("excitation", settings))
+    return actions
+
+
+def _node(executable, settings):
+    return Node(
+        package="hydraulic_sysid",
+        executable=executable,
+        name=executable,
+        namespace="/actuator",
+        parameters=[settings],
+        output="screen",
+    )
+
+
+def _brought_up(plant):
+    """Configure the plant now, and activate it once that has worked."""
+    configure = ChangeState(lifecycle_node_matcher=matches_action(plant), transition_id=Transition.TRANSITION_CONFIGURE)
+    activate = ChangeState(lifecycle_node_matcher=matches_action(plant), transition_id=Transition.TRANSITION_ACTIVATE)
+    then = OnStateTransition(
+        target_lifecycle_node=plant,
+        start_state="configuring",
+        goal_state="inactive",
+        entities=[EmitEvent(event=activate)],
+    )
+    return [RegisterEventHandler(then), EmitEvent(event=configure)]
