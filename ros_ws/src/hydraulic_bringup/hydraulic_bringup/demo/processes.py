@@ -19,8 +19,8 @@ _PR_SET_PDEATHSIG = 1
 _TAIL = 12  # lines of a log that an error shows
 
 try:
-    _LIBC = ctypes.CDLL(None)
-except OSError:  # no libc to ask: then only a killed demo can leave children
+    _LIBC: ctypes.CDLL | None = ctypes.CDLL(None)
+except OSError:  # no libc to ask: then only a demo that is killed outright can leave children
     _LIBC = None
 
 

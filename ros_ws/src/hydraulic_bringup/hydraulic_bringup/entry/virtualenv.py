@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -53,13 +52,23 @@ def carry_out(todo: Plan, need: Stamp, checkout: Checkout, ros: Ros, environ: Ma
 def _create(todo: Plan, need: Stamp, checkout: Checkout, ros: Ros, environ: Mapping[str, str], lock: int) -> None:
     _require_venv(need)
     try:
-        _clear(todo, checkout.venv)
+        if todo.action == "move" or checkout.venv.is_symlink():
+            _move_aside(checkout.venv)
+        elif checkout.venv.exists():  # the better part of a minute on a slow disk
+            run_step(
+                "Removing the old .venv",
+                ["rm", "-rf", checkout.venv],
+                log=checkout.logs / "remove.log",
+                environ=environ,
+                cwd=checkout.root,
+                remedy=f"Delete {checkout.venv} yourself, then call ./bench again.",
+                keep_open=[lock],
+            )
+        checkout.venv.mkdir()
         replace(need, stage=INSTALLING).write(checkout.venv)
     except OSError as error:
         raise BenchError(
-            f"Cannot replace {checkout.venv}.",
-            why=str(error),
-            remedy="Correct its permissions, or delete it.",
+            f"Cannot replace {checkout.venv}.", why=str(error), remedy="Correct its permissions, or delete it."
         ) from error
     visible = ["--system-site-packages"] if ros.prefix else []
     run_step(
@@ -73,17 +82,11 @@ def _create(todo: Plan, need: Stamp, checkout: Checkout, ros: Ros, environ: Mapp
     )
 
 
-def _clear(todo: Plan, venv: Path) -> None:
-    """An empty folder at `venv`; what the user put there is moved aside, not deleted."""
-    if todo.action == "move":
-        aside = _free_name(venv)
-        venv.rename(aside)
-        print(f"It is now {aside}.", file=sys.stderr, flush=True)
-    elif venv.is_symlink():
-        venv.unlink()
-    elif venv.exists():
-        shutil.rmtree(venv)
-    venv.mkdir()
+def _move_aside(venv: Path) -> None:
+    """What the user put there is kept."""
+    aside = _free_name(venv)
+    venv.rename(aside)
+    print(f"It is now {aside}.", file=sys.stderr, flush=True)
 
 
 def _install(checkout: Checkout, ros: Ros, environ: Mapping[str, str], lock: int) -> None:

@@ -111,13 +111,13 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace, console: Console) -> int:
     model = load_model(options.model)
     if options.record:
-        records, held_out = read_all([Path(p) for p in options.record], options.columns), []
+        records = read_all([Path(p) for p in options.record], options.columns)
     out = _folder(options.out)
     begun = time.monotonic()
     if options.record:
         console.print(f"comparing {model.name} with {len(records)} record(s); results in {out}")
         with ProgressSteps(console, _OFFLINE_S) as steps:
-            analysis = offline.analyse(records, held_out, model, out, steps)
+            analysis = offline.analyse(records, [], model, out, steps)
     else:
         files = resources.files("hydraulic_bringup.demo")
         kind = "quick" if options.quick else "full"
@@ -149,7 +149,9 @@ def _print(analysis: offline.Analysis, console: Console) -> None:
     compared = analysis.compared
     channels: dict[str, Any] = {n: c for n, c in compared["channels"].items() if n in SHOWN}
     ahead = f"{compared['settings']['horizon']:g} s ahead"
-    table = Table(title=f"RMS error of {compared['model']['name']} {ahead}", title_justify="left")
+    table = Table(
+        title=f"RMS error of {compared['model']['name']} {ahead} (× that of an exact model)", title_justify="left"
+    )
     table.add_column("record", no_wrap=True)
     for channel in channels.values():
         table.add_column(channel["title"], justify="right")
@@ -173,7 +175,7 @@ def _cell(figures: dict[str, Any] | None, unit: str) -> str:
     if figures is None:
         return "–"
     exact = figures.get("exact_rmse")
-    times = f" ({number(figures['rmse'] / exact)} x exact)" if exact else ""
+    times = f" ({number(figures['rmse'] / exact)}×)" if exact else ""
     return f"{quantity(figures['rmse'], unit)}{times}"
 
 
