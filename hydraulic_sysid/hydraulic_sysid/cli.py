@@ -90,6 +90,7 @@ def run(
 
     `HydraulicSysidError`, `HydraulicSimError`, `OSError` and ``errors`` are the user's: printed, exit code 2.
     """
+    bad_input: tuple[type[Exception], ...] = (HydraulicSysidError, HydraulicSimError, OSError, *errors)
     try:
         options = parser.parse_args(argv)
     except SystemExit as stop:  # argparse has printed the help or what is wrong
@@ -105,7 +106,7 @@ def run(
     except KeyboardInterrupt:
         print(f"{parser.prog}: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except (HydraulicSysidError, HydraulicSimError, OSError, *errors) as error:
+    except bad_input as error:
         print(f"{parser.prog}: {_text(error)}", file=sys.stderr)
         return BAD_INPUT
 

@@ -48,17 +48,22 @@ class CsvTable:
         rows = [number for number, line in enumerate(lines, 1) if line and not line.isspace()]
         if len(rows) != len(lines):
             lines = [lines[number - 1] for number in rows]
+        # A comment of '#' lines may stand before the table.
+        comments = next((k for k, line in enumerate(lines) if not line.lstrip().startswith("#")), len(lines))
+        del lines[:comments], rows[:comments]
         if not lines:
             raise FileError(path, "the file is empty", expected="a header and rows of numbers")
-        self._delimiter = (columns and columns.delimiter) or _delimiter(lines[-1])
+        self._delimiter = (columns and columns.delimiter) or _delimiter(lines[min(1, len(lines) - 1)])
         self.names: Sequence[str] = ()
+        self._header_row = 0
         cells = self._cells(lines[0])
-        if _has_header(path, cells, columns.header if columns else None, columns and columns.decimal):
+        if _has_header(path, rows[0], cells, columns.header if columns else None):
             self.names = [cell.strip() for cell in cells]
+            self._header_row = rows[0]
             del lines[0], rows[0]
             twice = [name for index, name in enumerate(self.names) if name in self.names[:index]]
             if twice:
-                raise FileError(path, f"two columns are called {twice[0]!r}", row=1)
+                raise FileError(path, f"two columns are called {twice[0]!r}", row=self._header_row)
         if len(lines) < 2:
             raise FileError(path, f"{len(lines)} rows of numbers", expected="at least two")
         self._rows, self._lines = rows, lines
@@ -66,12 +71,12 @@ class CsvTable:
         self._check_ragged()
         decimal = columns.decimal if columns else None
         if decimal is None:
-            decimal = "," if self._delimiter != "," and "," in lines[0] and "." not in lines[0] else "."
+            commas = self._delimiter != "," and any("," in line for line in lines)
+            decimal = "," if commas and not any("." in line for line in lines) else "."
         if decimal == "," and self._delimiter == ",":
             raise ColumnMapError(f"{path}: decimal and delimiter cannot both be ','")
         self._comma = decimal == ","
         self._numbers: Array | None = None
-        self._unread: dict[int, Array] = {}
 
     def map_of_header(self, base: ColumnMap | None = None) -> ColumnMap:
         """The map that the header states; ``base`` says the rest, and perhaps the time.
@@ -86,17 +91,17 @@ class CsvTable:
         try:
             found = dict(column_of_header(name) for name in self.names)
         except ColumnMapError as error:
-            raise ColumnMapError(f"{self.path}, row 1: {error}") from None
+            raise ColumnMapError(f"{self.path}, row {self._header_row}: {error}") from None
         if len(found) != len(self.names):
-            raise ColumnMapError(f"{self.path}, row 1: two columns are the same channel: {self.names}")
+            raise ColumnMapError(f"{self.path}, row {self._header_row}: two columns are the same channel: {self.names}")
         time = found.pop("time", None)
         base = base or ColumnMap({})
         if base.time is not None or base.dt is not None:
             time = base.time
         elif time is None:
-            raise ColumnMapError(f"{self.path}, row 1: no time column; expected one such as time_s")
+            raise ColumnMapError(f"{self.path}, row {self._header_row}: no time column; expected one such as time_s")
         if not found:
-            raise ColumnMapError(f"{self.path}, row 1: only a time; expected channels beside it")
+            raise ColumnMapError(f"{self.path}, row {self._header_row}: only a time; expected channels beside it")
         return replace(base, parts={"": found}, time=time)
 
     def numbers(self, column: str | int) -> Array:
@@ -126,7 +131,10 @@ class CsvTable:
     def _cells(self, line: str) -> list[str]:
         if self._delimiter == " ":
             return line.split()
-        return next(csv.reader([line], delimiter=self._delimiter))
+        try:
+            return next(csv.reader([line], delimiter=self._delimiter))
+        except csv.Error as error:
+            raise FileError(self.path, f"not a row of cells ({error}): {line[:40]!r}") from None
 
     def _check_ragged(self) -> None:
         if self._delimiter == " ":
@@ -150,7 +158,7 @@ class CsvTable:
 
     def _parse(self, wanted: Sequence[int] | None) -> Array:
         lines = [line.replace(",", ".") for line in self._lines] if self._comma else self._lines
-        return np.loadtxt(
+        numbers = np.loadtxt(
             lines,
             delimiter=None if self._delimiter == " " else self._delimiter,
             usecols=wanted,
@@ -158,13 +166,14 @@ class CsvTable:
             quotechar='"',
             ndmin=2,
         )
+        if numbers.shape[0] != len(lines):  # a quote that is not closed takes the next row in
+            raise ValueError("a quotation mark is not closed")
+        return numbers
 
     def _complaint(self, index: int, error: ValueError) -> FileError:
         for row, line in zip(self._rows, self._lines, strict=True):
             cell = self._cells(line)[index].strip()
-            try:
-                float(cell.replace(",", ".") if self._comma else cell)
-            except ValueError:
+            if not _is_number(cell, self._comma):
                 problem = f"{cell!r} is no number" if cell else "the cell is empty"
                 label = self.names[index] if self.names else index + 1
                 return FileError(self.path, problem, row=row, column=label, expected="a number")
@@ -192,7 +201,7 @@ def _delimiter(line: str) -> str:
     return next((mark for mark in (";", "\t", ",") if mark in line), " ")
 
 
-def _has_header(path: Path, cells: Sequence[str], wanted: bool | None, decimal: str | None) -> bool:
+def _has_header(path: Path, row: int, cells: Sequence[str], wanted: bool | None) -> bool:
     if wanted is not None:
         return wanted
     numeric = [_is_number(cell) for cell in cells]
@@ -201,16 +210,19 @@ def _has_header(path: Path, cells: Sequence[str], wanted: bool | None, decimal: 
         raise FileError(
             path,
             f"{cells[odd].strip()!r} stands among numbers",
-            row=1,
+            row=row,
             column=odd + 1,
             expected="a header of names only, or numbers only",
         )
     return not any(numeric)
 
 
-def _is_number(cell: str) -> bool:
+def _is_number(cell: str, comma: bool = True) -> bool:
+    """Whether a cell is a number as `numpy.loadtxt` reads it, with a comma for the point if that is allowed."""
+    if not cell.isascii() or "_" in cell:  # Python itself reads 1_000 and digits of other scripts
+        return False
     try:
-        float(cell.replace(",", "."))
+        float(cell.replace(",", ".") if comma else cell)
     except ValueError:
         return False
     return True

@@ -68,7 +68,15 @@ class Record:
     ) -> Record:
         """The record of channels that were sampled every ``dt`` seconds."""
         count = len(next(iter(channels.values()), ()))
-        return cls(name, dt * np.arange(count), dt, dict(channels), source, dict(description or {}), dict(units or {}))
+        return cls(
+            name,
+            dt * np.arange(count, dtype=np.float64),
+            dt,
+            dict(channels),
+            source,
+            dict(description or {}),
+            dict(units or {}),
+        )
 
     def __contains__(self, channel: object) -> bool:
         return channel in self.channels

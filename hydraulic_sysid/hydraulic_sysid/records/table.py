@@ -18,6 +18,7 @@ from hydraulic_sysid.records.record import Record
 
 Array = NDArray[np.float64]
 
+_WORTH_A_NOTE = 0.05  # of a period that stamps are off the even grid
 _MOST_SAMPLES = 20_000_000  # of a resampled record
 
 
@@ -25,7 +26,10 @@ class Table(Protocol):
     """Named or numbered columns of numbers, read from one file."""
 
     path: Path
-    names: Sequence[str]
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of all columns; empty where they have none."""
 
     def numbers(self, column: str | int) -> Array:
         """``(N,)`` of a column; raises FileError if there is none or it holds something else."""
@@ -99,7 +103,7 @@ def evenly_sampled(
             bounds = [0, *sampling.gaps(time), time.size]
             pieces = [(a, b) for a, b in zip(bounds, bounds[1:], strict=False) if b - a > 1]
         return list(_pieces(samples, pieces, name, notes, description))
-    except sampling.IrregularTime as error:
+    except sampling.IrregularTimeError as error:
         row = samples.row(error.index)
         hint = "; a column map can say time.irregular: resample or split" if irregular == "error" else ""
         raise TimeError(
@@ -125,14 +129,17 @@ def _pieces(
         time = samples.time[first:last]
         try:
             even = sampling.sampling(time)
-        except sampling.IrregularTime as error:
-            raise sampling.IrregularTime(error.index + first, error.problem, error.expected) from None
+        except sampling.IrregularTimeError as error:
+            raise sampling.IrregularTimeError(error.index + first, error.problem, error.expected) from None
         described = {
             **description,
             "notes": list(notes),
             "start_s": float(time[0]),
             "stamp_deviation_s": {"p99": even.deviation_p99, "max": even.deviation_max},
         }
+        if even.deviation_p99 > _WORTH_A_NOTE * even.dt:
+            off = f"99 % up to {even.deviation_p99:.3g} s, at most {even.deviation_max:.3g} s"
+            described["notes"] = [*notes, f"time: stamps are off the even grid of {even.dt:.6g} s: {off}"]
         if len(pieces) > 1:
             described["piece"] = [number, len(pieces)]
         channels = {channel: values[first:last] for channel, values in samples.channels.items()}
@@ -147,7 +154,7 @@ def _resampled(samples: Samples, name: str, notes: Sequence[str], description: M
     span = float(time[-1] - time[0])
     if span > _MOST_SAMPLES * dt:
         problem = f"resampling {span:.6g} s every {dt:.6g} s makes more than {_MOST_SAMPLES} samples"
-        raise sampling.IrregularTime(int(np.argmax(np.diff(time))) + 1, problem, "shorter gaps")
+        raise sampling.IrregularTimeError(int(np.argmax(np.diff(time))) + 1, problem, "shorter gaps")
     count = int(span / dt + 1e-6) + 1
     grid = time[0] + dt * np.arange(count)
     before = np.clip(np.searchsorted(time, grid + 1e-6 * dt, side="right") - 1, 0, time.size - 1)
