@@ -7,6 +7,9 @@ import json
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
 from hydraulic_sysid.excitation import (
     ExcitationError,
     Plan,
@@ -20,8 +23,6 @@ from hydraulic_sysid.excitation.signals.chirp import Chirp
 from hydraulic_sysid.excitation.signals.multisine import Multisine
 from hydraulic_sysid.excitation.signals.steps import Steps
 from hydraulic_sysid.excitation.signals.triangle import Triangle
-from hypothesis import given
-from hypothesis import strategies as st
 
 SIGNALS = st.one_of(
     st.builds(Triangle, st.floats(0.1, 8.0), st.floats(0.05, 40.0)),
@@ -75,9 +76,7 @@ def test_a_plan_survives_yaml_and_json(plan):
 
 
 def test_fades_are_raised_cosines_over_signal_and_offset():
-    plan = Plan(
-        "any", Steps([2.0], 1.0), 0.5, duration=4.0, offset=1.0, fade_in=1.0, fade_out=2.0, rest_before=0.5
-    )
+    plan = Plan("any", Steps([2.0], 1.0), 0.5, duration=4.0, offset=1.0, fade_in=1.0, fade_out=2.0, rest_before=0.5)
     at = [500, 750, 1000, 1250, 1500, 2500, 3000, 3500, 4000]  # samples: 0.5 s … 4 s
     rising = [0.5 - 0.5 * np.cos(np.pi * t) for t in (0, 0.25, 0.5, 0.75, 1.0)]
     falling = [0.5 + 0.5 * np.cos(np.pi * t / 2) for t in (0, 0.5, 1.0, 1.5)]

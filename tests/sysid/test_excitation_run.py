@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from hydraulic_sysid.excitation import AppliedDriveCheck, ExcitationRun, Phase, Plan, load_plan, shipped_plans
 from hydraulic_sysid.excitation.run import HOLD_S, STOP_RAMP_S
 from hydraulic_sysid.excitation.signals.chirp import Chirp
 from hydraulic_sysid.excitation.signals.steps import Steps
 from hydraulic_sysid.excitation.signals.triangle import Triangle
-from hypothesis import given
-from hypothesis import strategies as st
 
 SPEED_GAIN = 0.03  # m/s per volt, about that of the bench
 STEP = 0.001
@@ -230,14 +231,30 @@ def test_a_plant_that_does_not_apply_the_command_ends_the_run(signal, apply):
     run = ExcitationRun(plan(signal), applied_check=AppliedDriveCheck())
     time, _, _ = play(run, apply=apply)
     assert run.phase is Phase.ABORTED and run.reason.startswith("the plant")
-    assert time[-1] < 1.0
+    assert time[-1] < 1.5
+
+
+@pytest.mark.parametrize("signal", [FAST, SLOW, Steps([5.0, -5.0], 0.05)])
+def test_a_moment_in_which_nothing_is_answered_is_forgiven(signal):
+    """States that came while the process was held up are answered in a bundle; the plant held its drive."""
+    run = ExcitationRun(plan(signal), applied_check=AppliedDriveCheck())
+    calls, kept = [0], [0.0]
+
+    def apply(drive):
+        calls[0] += 1
+        if not 700 <= calls[0] < 950:
+            kept[0] = drive
+        return kept[0]
+
+    play(run, apply=apply)
+    assert run.phase is Phase.FINISHED, run.reason
 
 
 def test_a_reversed_drive_is_found_where_the_signal_is_slower_than_the_window():
     run = ExcitationRun(plan(SLOW), applied_check=AppliedDriveCheck())
     time, _, _ = play(run, apply=lambda drive: -drive)
     assert run.phase is Phase.ABORTED and run.reason.startswith("the plant applied")
-    assert time[-1] < 1.0
+    assert time[-1] < 1.5
 
 
 def test_a_plant_that_stops_obeying_in_the_middle_is_found():
@@ -250,4 +267,4 @@ def test_a_plant_that_stops_obeying_in_the_middle_is_found():
 
     time, _, _ = play(run, apply=apply)
     assert run.phase is Phase.ABORTED and "applied 0.000 … 0.000 V" in run.reason
-    assert 1.0 < time[-1] < 1.5
+    assert 1.0 < time[-1] < 2.0

@@ -7,6 +7,9 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from hydraulic_sysid.excitation import PlanError, PlaybackError, signal_kinds
 from hydraulic_sysid.excitation.signals.chirp import Chirp
 from hydraulic_sysid.excitation.signals.multisine import Multisine
@@ -14,8 +17,6 @@ from hydraulic_sysid.excitation.signals.playback import Playback
 from hydraulic_sysid.excitation.signals.random_phase_multisine import RandomPhaseMultisine
 from hydraulic_sysid.excitation.signals.steps import Steps
 from hydraulic_sysid.excitation.signals.triangle import Triangle
-from hypothesis import given
-from hypothesis import strategies as st
 
 AMPLITUDE = st.floats(0.01, 10.0)
 FREQUENCY = st.floats(0.05, 200.0)

@@ -3,7 +3,9 @@
 from hydraulic_sysid.excitation.applied import AppliedDriveCheck
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError, PlaybackError
 from hydraulic_sysid.excitation.plan import Plan, load_plan, save_plan, shipped_plans
+from hydraulic_sysid.excitation.plant_report import PlantReport
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
+from hydraulic_sysid.excitation.session import Session
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds
 
 __all__ = [
@@ -13,7 +15,9 @@ __all__ = [
     "Phase",
     "Plan",
     "PlanError",
+    "PlantReport",
     "PlaybackError",
+    "Session",
     "Signal",
     "load_plan",
     "save_plan",

@@ -37,11 +37,13 @@ class AppliedDriveCheck:
     of each block the applied drives must lie within the range of this and the last block's commands, and must
     have covered the middle half of the last block's range, both within `tolerance` [V]. The second condition
     finds a plant that stands at 0 V under a fast signal around zero. The first block is not judged: the plant
-    may be about to obey.
+    may be about to obey. It takes `patience` bad blocks in a row to make a fault: a process that the machine
+    held up for a moment answers a bundle of states late, and catches up.
     """
 
-    def __init__(self, tolerance: float = 0.1, window: float = 0.1) -> None:
-        self.tolerance, self.window = tolerance, window
+    def __init__(self, tolerance: float = 0.1, window: float = 0.2, patience: int = 3) -> None:
+        self.tolerance, self.window, self.patience = tolerance, window, patience
+        self._bad_blocks = 0
         self._last: _Block | None = None
         self._block = _Block()
         self._block_end: float | None = None
@@ -59,7 +61,8 @@ class AppliedDriveCheck:
             return None
         found = self._verdict(self._last, self._block) if self._last is not None else None
         self._last, self._block, self._block_end = self._block, _Block(), t + self.window
-        return found
+        self._bad_blocks = self._bad_blocks + 1 if found else 0
+        return found if self._bad_blocks >= self.patience else None
 
     def _verdict(self, last: _Block, block: _Block) -> str | None:
         if block.applied.low > block.applied.high:
@@ -67,10 +70,7 @@ class AppliedDriveCheck:
         allowed = last.commanded.joined(block.commanded)
         wanted, seen = last.commanded, last.applied.joined(block.applied)
         margin = 0.25 * (wanted.high - wanted.low) + self.tolerance
-        beyond = (
-            block.applied.low < allowed.low - self.tolerance
-            or block.applied.high > allowed.high + self.tolerance
-        )
+        beyond = block.applied.low < allowed.low - self.tolerance or block.applied.high > allowed.high + self.tolerance
         behind = seen.high < wanted.high - margin or seen.low > wanted.low + margin
         if not beyond and not behind:
             return None

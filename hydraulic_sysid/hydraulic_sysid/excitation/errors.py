@@ -20,9 +20,7 @@ class PlanError(ExcitationError):
 
     def inside(self, place: str) -> PlanError:
         """The same error, with the place that holds it put in front (file, section)."""
-        return PlanError(
-            f"{place}: {self.where}" if self.where else place, self.key, self.value, self.allowed
-        )
+        return PlanError(f"{place}: {self.where}" if self.where else place, self.key, self.value, self.allowed)
 
 
 class PlaybackError(ExcitationError):

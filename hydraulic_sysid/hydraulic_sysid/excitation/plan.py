@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
 from hydraulic_sysid.excitation.settings import Settings, number, section, text
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds
@@ -32,9 +32,7 @@ class Plan(Settings):
 
     name: str = text("name of the experiment; records are named after it")
     signal: Signal = section("what is played", Signal)
-    travel_limit: float = number(
-        "m", "a piston further from the centre aborts the run", above=0.0, maximum=100.0
-    )
+    travel_limit: float = number("m", "a piston further from the centre aborts the run", above=0.0, maximum=100.0)
     description: str = text("what the experiment is for", "")
     duration: float | None = number(
         "s",
@@ -44,9 +42,7 @@ class Plan(Settings):
         maximum=3600.0,
     )
     rate: float = number("Hz", "samples per second of the drive", 1000.0, minimum=1.0, maximum=10000.0)
-    amplitude_limit: float = number(
-        "V", "no drive goes beyond it", DRIVE_LIMIT_V, above=0.0, maximum=DRIVE_LIMIT_V
-    )
+    amplitude_limit: float = number("V", "no drive goes beyond it", DRIVE_LIMIT_V, above=0.0, maximum=DRIVE_LIMIT_V)
     offset: float = number("V", "added to the signal", 0.0, minimum=-DRIVE_LIMIT_V, maximum=DRIVE_LIMIT_V)
     fade_in: float = number("s", "raised cosine at the start", 0.5, minimum=0.0, maximum=60.0)
     fade_out: float = number("s", "raised cosine at the end", 0.5, minimum=0.0, maximum=60.0)
@@ -55,9 +51,7 @@ class Plan(Settings):
     centre: float = number(
         "m", "where centring pulls the piston to; 0 is mid stroke", 0.0, minimum=-100.0, maximum=100.0
     )
-    centring_gain: float = number(
-        "V/m", "drive per distance from the centre", 2.0, minimum=0.0, maximum=1000.0
-    )
+    centring_gain: float = number("V/m", "drive per distance from the centre", 2.0, minimum=0.0, maximum=1000.0)
     centring_limit: float = number("V", "centring asks for no more", 0.5, minimum=0.0, maximum=DRIVE_LIMIT_V)
 
     def check(self) -> None:
@@ -72,9 +66,7 @@ class Plan(Settings):
                 "fade_in + fade_out", self.fade_in + self.fade_out, f"up to {self.active_time:g} s (duration)"
             )
         if 2.0 * self.signal.highest_frequency > self.rate:
-            allowed = (
-                f"at least {2.0 * self.signal.highest_frequency:g} Hz, twice the signal's highest frequency"
-            )
+            allowed = f"at least {2.0 * self.signal.highest_frequency:g} Hz, twice the signal's highest frequency"
             raise self.error("rate", self.rate, allowed)
         peak = float(np.max(np.abs(self.open_loop), initial=0.0))
         if peak > self.amplitude_limit * (1 + 1e-12):
@@ -106,18 +98,14 @@ class Plan(Settings):
         since, left = self.time - self.rest_before, self.rest_before + self.active_time - self.time
         slack = 1e-6 / self.rate
         active = (since > -slack) & (left > slack)
-        return np.where(
-            active, _raised_cosine(since, self.fade_in) * _raised_cosine(left, self.fade_out), 0.0
-        )
+        return np.where(active, _raised_cosine(since, self.fade_in) * _raised_cosine(left, self.fade_out), 0.0)
 
     @cached_property
     def open_loop(self) -> Array:
         """The drive without centring [V], (N,)."""
         active = self.envelope > 0.0
         drive = np.zeros(self.time.size)
-        drive[active] = self.envelope[active] * (
-            self.offset + self.signal.sample(self.time[active] - self.rest_before)
-        )
+        drive[active] = self.envelope[active] * (self.offset + self.signal.sample(self.time[active] - self.rest_before))
         return drive
 
     @classmethod
@@ -148,9 +136,7 @@ def _kind(signal: Signal) -> str:
 def _signal(content: Any, folder: Path | None) -> Signal:
     kinds = signal_kinds()
     if not isinstance(content, Mapping) or "kind" not in content:
-        raise PlanError(
-            "", "signal", content, f"a section with kind: {' | '.join(kinds)}, and the kind's parameters"
-        )
+        raise PlanError("", "signal", content, f"a section with kind: {' | '.join(kinds)}, and the kind's parameters")
     kind = content["kind"]
     if kind not in kinds:
         raise PlanError("signal", "kind", kind, " | ".join(kinds))
@@ -180,9 +166,7 @@ def load_plan(source: str | Path) -> Plan:
         known = ", ".join(shipped_plans())
         raise ExcitationError(f"{file}: is not a readable plan: {error}; plans by name: {known}") from error
     if not isinstance(content, Mapping):
-        raise PlanError(
-            str(file), "content", content, "a YAML mapping with at least name, signal and travel_limit"
-        )
+        raise PlanError(str(file), "content", content, "a YAML mapping with at least name, signal and travel_limit")
     try:
         return Plan.from_mapping(content, file.resolve().parent)
     except PlanError as error:

@@ -93,10 +93,15 @@ class ExcitationRun:
             self.phase, self.reason = Phase.STOPPING, reason
             self._stop_drive, self._end = self.drive, self._time + STOP_RAMP_S
 
-    def check_age(self, age: float) -> None:
-        """Abort when `age` [s] of the last state is beyond what is allowed; to be called while none comes."""
-        if age > self._state_timeout:
+    def check_age(self, age: float) -> bool:
+        """Abort when `age` [s] of the last state is beyond what is allowed, and say whether it is.
+
+        To be called by a clock that runs while no state comes.
+        """
+        silent = age > self._state_timeout
+        if silent:
             self.abort(f"no state for {age:.3f} s (allowed: {self._state_timeout:g} s)")
+        return silent
 
     def _guard(self, t: float, position: float, applied: float | None) -> None:
         plan = self.plan

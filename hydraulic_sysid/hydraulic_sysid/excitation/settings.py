@@ -48,11 +48,7 @@ class Number(Declaration):
 
     @property
     def allowed(self) -> str:
-        low = (
-            ""
-            if self.minimum == -math.inf
-            else f"{'above' if self.open_minimum else 'from'} {self.minimum:g}"
-        )
+        low = "" if self.minimum == -math.inf else f"{'above' if self.open_minimum else 'from'} {self.minimum:g}"
         high = "" if self.maximum == math.inf else f"up to {self.maximum:g}"
         limits = " ".join(part for part in (low, high) if part)
         return " ".join(part for part in ("a number", limits, self.unit) if part)
@@ -248,9 +244,7 @@ class Settings:
                 raise PlanError(cls.label, str(key), value, "one of the keys " + ", ".join(declared))
         for key, item in declared.items():
             if key not in mapping and item.default is MISSING:
-                raise PlanError(
-                    cls.label, key, None, f"{item.metadata['declaration'].allowed} (the key is missing)"
-                )
+                raise PlanError(cls.label, key, None, f"{item.metadata['declaration'].allowed} (the key is missing)")
         values = dict(mapping)
         for key, item in declared.items():
             is_path = isinstance(item.metadata["declaration"], FilePath)

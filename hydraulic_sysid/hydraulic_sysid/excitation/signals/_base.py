@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from numpy.typing import NDArray
 
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sysid.excitation.settings import Settings, number
 
 Array = NDArray[np.float64]

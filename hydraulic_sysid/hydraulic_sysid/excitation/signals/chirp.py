@@ -32,9 +32,7 @@ class Chirp(Signal):
     frequency_end: float = number("Hz", "frequency at the end of the sweep", above=0.0, maximum=1000.0)
     sweep_time: float = number("s", "duration of one sweep", above=0.0, maximum=3600.0)
     law: str = choice("how the frequency rises", ("exponential", "linear"), "exponential")
-    phase: float = number(
-        "rad", "phase at the start of the sweep", 0.0, minimum=-2 * math.pi, maximum=2 * math.pi
-    )
+    phase: float = number("rad", "phase at the start of the sweep", 0.0, minimum=-2 * math.pi, maximum=2 * math.pi)
 
     @property
     def length(self) -> float:
@@ -58,9 +56,7 @@ class Chirp(Signal):
     def sample(self, t: Array) -> Array:
         share = np.mod(t, self.sweep_time) / self.sweep_time
         if self._log_ratio:
-            turns = (
-                self.frequency_start * self.sweep_time * np.expm1(self._log_ratio * share) / self._log_ratio
-            )
+            turns = self.frequency_start * self.sweep_time * np.expm1(self._log_ratio * share) / self._log_ratio
         else:
             rise = 0.5 * (self.frequency_end - self.frequency_start) * share
             turns = self.sweep_time * share * (self.frequency_start + rise)

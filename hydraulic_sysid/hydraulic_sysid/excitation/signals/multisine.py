@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sysid.excitation.settings import choice, integer, numbers
 from hydraulic_sysid.excitation.signals._base import Array, Signal
 

@@ -11,8 +11,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sysid.excitation.errors import PlaybackError
 from hydraulic_sysid.excitation.settings import number, path, text
 from hydraulic_sysid.excitation.signals._base import Array, Signal

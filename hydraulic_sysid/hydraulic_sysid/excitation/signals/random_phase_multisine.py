@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sysid.excitation.settings import integer, number
 from hydraulic_sysid.excitation.signals._base import Array, Signal
 from hydraulic_sysid.excitation.signals.multisine import random_phases, sum_of_tones

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sysid.excitation.settings import number, numbers
 from hydraulic_sysid.excitation.signals._base import Array, Signal
 
@@ -18,9 +18,7 @@ class Steps(Signal):
 
     label = "steps"
 
-    levels: tuple[float, ...] = numbers(
-        "V", "the levels in their order", minimum=-DRIVE_LIMIT_V, maximum=DRIVE_LIMIT_V
-    )
+    levels: tuple[float, ...] = numbers("V", "the levels in their order", minimum=-DRIVE_LIMIT_V, maximum=DRIVE_LIMIT_V)
     hold: float = number("s", "how long each level stands", above=0.0, maximum=3600.0)
 
     @property

@@ -27,7 +27,5 @@ class Triangle(Signal):
         return self.frequency
 
     def sample(self, t: Array) -> Array:
-        turn = np.mod(
-            np.asarray(t) * self.frequency + 0.25, 1.0
-        )  # a quarter on, so that it starts at zero, rising
+        turn = np.mod(np.asarray(t) * self.frequency + 0.25, 1.0)  # a quarter on, so that it starts at zero, rising
         return self.amplitude * (1.0 - 4.0 * np.abs(turn - 0.5))

@@ -1,0 +1,38 @@
+"""What the plant says about itself on `/diagnostics`, as far as an excitation must know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from hydraulic_interfaces.contract import PLANT_NODE, absolute
+
+PLANT_ROW = f"{absolute(PLANT_NODE)}: plant"
+COMMAND_ROW = f"{absolute(PLANT_NODE)}: command"
+
+
+class PlantReport:
+    """The latest of the plant's two rows: is it enabled, whom does it obey, what does it complain about."""
+
+    def __init__(self) -> None:
+        self._rows: dict[str, tuple[bool, str, dict[str, str]]] = {}
+
+    def update(self, name: str, ok: bool, message: str, values: Mapping[str, str]) -> None:
+        """Take a row of the diagnostics; rows of other nodes are passed over."""
+        if name in (PLANT_ROW, COMMAND_ROW):
+            self._rows[name] = (ok, message, dict(values))
+
+    @property
+    def disabled(self) -> str:
+        """Why the plant moves for nobody, in its own words; empty when it is enabled."""
+        _, message, values = self._rows.get(PLANT_ROW, (False, "no diagnostics of the plant yet", {}))
+        return "" if values.get("enabled") == "True" else message
+
+    def foreign_source(self, own: str) -> str:
+        """The other source that the plant obeys now; empty when there is none."""
+        source = self._rows.get(COMMAND_ROW, (True, "", {}))[2].get("source", "")
+        return "" if source == own else source
+
+    @property
+    def trouble(self) -> str:
+        """What the plant complains about; empty when nothing."""
+        return "; ".join(message for ok, message, _ in self._rows.values() if not ok)

@@ -1,0 +1,144 @@
+"""Node `/actuator/excitation`: plays an excitation plan, one command for every state of the plant.
+
+A command carries the stamp of the state it answers, so that the plant sees the whole delay of the loop in it.
+The topic `experiment` tells what is played, how it ended and why; `~/start` and `~/abort` are the switches.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.duration import Duration
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from hydraulic_interfaces.contract import EXCITATION_NODE, NAMESPACE
+from hydraulic_interfaces.conversions import CommandEncoder, MessageError, sample_from_messages
+from hydraulic_interfaces.nodes.parameters import ParameterTable
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_interfaces.qos import profile
+from hydraulic_sysid.excitation import ExcitationError, Phase, Plan, Session, load_plan, shipped_plans
+from hydraulic_sysid.nodes._excitation_health import health
+from hydraulic_sysid.nodes._serving import ServedNode, serve
+
+PARAMETERS = (
+    ParameterSpec("plan", "chirp", f"plan file, or one of {', '.join(shipped_plans())}", live=True),
+    ParameterSpec("autostart", False, "start as soon as the plant is enabled and its state flows"),
+    ParameterSpec("exit_when_done", False, "leave after the run: exit code 0 finished, 1 aborted", live=True),
+    ParameterSpec("start_timeout", 0.0, "autostart waits no longer; 0: for ever", "s", 0.0, 3600.0),
+    ParameterSpec("listeners", 1, "subscribers of command to wait for: plant, recorder, …", "", 1, 100, live=True),
+    ParameterSpec("state_timeout", 0.2, "silence of the state that aborts a run", "s", 0.01, 10.0, live=True),
+    ParameterSpec("applied_tolerance", 0.1, "applied and commanded drive may differ", "V", 0.0, 10.0, live=True),
+)
+HEALTH_PERIOD_S = 0.5
+
+
+class ExcitationNode(ServedNode):
+    """Parameters, topics and services around a `Session`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(EXCITATION_NODE, namespace=NAMESPACE, **options)
+        self._table = ParameterTable(self, PARAMETERS)
+        plan = load_plan(self._table["plan"])  # a bad plan is to be heard of now, not at the start
+        self._encode = CommandEncoder(EXCITATION_NODE)
+        self._command = self.create_publisher(JointState, "command", profile("command"))
+        self._experiment = self.create_publisher(String, "experiment", profile("experiment"))
+        self._health = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
+        self._session = Session(self._tell, self._command.get_subscription_count)
+        self._patience_ends, self._reported = math.inf, -math.inf
+        self._leaving = False
+        if self._table["autostart"]:
+            self._arm(plan)
+            self._patience_ends = time.monotonic() + (self._table["start_timeout"] or math.inf)
+        self.create_subscription(JointState, "state", self._on_state, profile("state"))
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, profile("diagnostics"))
+        self.create_service(Trigger, "~/start", self._on_start)
+        self.create_service(Trigger, "~/abort", self._on_abort)
+
+    def watch(self) -> None:
+        """What must happen without a message: notice silence, give up waiting, report health, leave."""
+        now = time.monotonic()
+        last_command = self._session.silence(now)
+        if last_command is not None:
+            self._command.publish(self._encode(*last_command))
+        if self._session.ended and not self._session.busy:
+            self.exit_code = 0 if self._session.ended is Phase.FINISHED else 1
+            self.over = self._leaving or self._table["exit_when_done"]
+        if now - self._reported > HEALTH_PERIOD_S:
+            self._reported = now
+            waiting_for = self._session.obstacle(now) if self._session.armed else ""
+            self._health.publish(health(self._session, waiting_for, self.get_clock().now().nanoseconds))
+            if self._session.armed and now > self._patience_ends:
+                self.get_logger().error(f"not started: waited too long for {waiting_for}")
+                self._session.stop("")
+                self.exit_code, self.over = 1, self._table["exit_when_done"]
+
+    def interrupt(self, name: str) -> None:
+        """SIGINT or SIGTERM: bring the drive to zero first, where a run is on."""
+        self._leaving = True
+        self._session.stop(f"interrupted by {name}")
+        self.over = not self._session.busy
+
+    def close(self) -> None:
+        """Let the last messages arrive before the publishers go."""
+        for publisher in (self._experiment, self._command):
+            publisher.wait_for_all_acked(Duration(seconds=1))
+
+    def _arm(self, plan: Plan) -> None:
+        self._session.state_timeout = self._table["state_timeout"]
+        self._session.applied_tolerance = self._table["applied_tolerance"]
+        self._session.listeners_needed = self._table["listeners"]
+        self._session.armed = plan
+
+    def _tell(self, event: str) -> None:
+        self._experiment.publish(String(data=event))
+        self.get_logger().info(self._session.last_end if self._session.ended else "started")
+
+    def _on_state(self, message: JointState) -> None:
+        try:
+            sample = sample_from_messages(message)
+        except MessageError as error:
+            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+            return
+        drive = self._session.answer(sample, time.monotonic())
+        if drive is not None:
+            self._command.publish(self._encode(sample.stamp_ns, drive))
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for row in message.status:
+            values = {pair.key: pair.value for pair in row.values}
+            self._session.diagnose(row.name, row.level == DiagnosticStatus.OK, row.message, values)
+
+    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._session.busy:
+            response.message = "refused: a run is on, or waits to start"
+            return response
+        obstacle = self._session.obstacle(time.monotonic())
+        try:
+            plan = load_plan(self._table["plan"])
+        except ExcitationError as error:
+            obstacle = str(error)
+        if obstacle:
+            response.message = f"refused: {obstacle}"
+        else:
+            self._arm(plan)
+            response.success, response.message = True, f"starting {plan.name}, {plan.total_time:g} s"
+        return response
+
+    def _on_abort(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self._session.stop("asked to abort")
+        response.message = "stopping" if response.success else "nothing to abort"
+        return response
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the node; exit code 0, 1 when a run was aborted or not started, 2 for a bad parameter or plan."""
+    return serve(ExcitationNode, "Play an excitation plan on the actuator.", PARAMETERS, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
