@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import PISTON, SERVOVALVE, topic
 from hydraulic_sysid.bag import cdr, reader
-from hydraulic_sysid.bag.reader import Bag
-from hydraulic_sysid.bag.writer import SUFFIX
+from hydraulic_sysid.bag.reader import SUFFIX, Bag
 from hydraulic_sysid.records.errors import BagError, TimeError
 from hydraulic_sysid.records.experiments import Span, spans
 from hydraulic_sysid.records.record import Record
@@ -67,7 +66,7 @@ def _records(
     start = int(stamps[span.first])
     samples = Samples(
         path,
-        (stamps[chosen] - start) * 1e-9,
+        (stamps[chosen] - start).astype(np.float64) * 1e-9,
         {name: values[chosen] for name, values in channels.items()},
         lambda index: index + 1,
         f"stamp of {topic('state')}",

@@ -47,10 +47,6 @@ class ColumnMapError(RecordError):
     """A column map is wrong in itself, or names columns that the file does not have."""
 
 
-class UnitError(RecordError):
-    """A unit is unknown, or does not measure what its channel is."""
-
-
 class BagError(FileError):
     """A bag cannot be read or written: not a bag, cut off, damaged, or without the contract's topics."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import topic
-from hydraulic_sysid.bag.reader import Bag, json_of
+from hydraulic_sysid.bag.reader import Bag
+from hydraulic_sysid.bag.types import string_data
 
 STARTED = "started"
 ENDED = ("finished", "aborted")
@@ -37,7 +39,7 @@ def spans(bag: Bag, stamps: NDArray[np.int64]) -> list[Span]:
     An experiment without an end lasts until the next one or the end of the bag.
     """
     stream = bag.streams.get(topic("experiment"))
-    events = [event for event in map(json_of, stream.payloads if stream else ()) if event and "stamp_ns" in event]
+    events = [event for event in map(_event, stream.payloads if stream else ()) if event is not None]
     starts = [i for i, event in enumerate(events) if event.get("event") == STARTED]
     starts = [i for i in starts if stamps[0] <= int(events[i]["stamp_ns"]) <= stamps[-1]]
     if not starts:
@@ -59,3 +61,13 @@ def spans(bag: Bag, stamps: NDArray[np.int64]) -> list[Span]:
         name = f"{number + 1}" if len(starts) > 1 else ""
         found.append(Span(int(first), int(last), name, experiment, notes))
     return found
+
+
+def _event(payload: bytes) -> dict[str, Any] | None:
+    """The event in a message; None where it holds something else, which is none of the excitation's."""
+    try:
+        event = json.loads(string_data(payload))
+    except Exception:  # anybody may publish anything there
+        return None
+    usable = isinstance(event, dict) and isinstance(event.get("stamp_ns"), int)
+    return event if usable else None

@@ -13,10 +13,6 @@ from hydraulic_sysid.records.record import Record
 _BAG_SUFFIX = ".mcap"
 _SUFFIXES = (*csv_file.SUFFIXES, *mat_file.SUFFIXES, _BAG_SUFFIX)
 
-# The reader of bags is loaded when there is one to read: it needs this package's errors itself.
-BAG_SUFFIX = ".mcap"
-METADATA = "metadata.yaml"
-
 
 def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None) -> list[Record]:
     """Records in a bag folder, a .csv, .csv.gz or .mat file, or a folder of such, in the order of their names.
@@ -31,7 +27,7 @@ def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None
     mapping = columns if isinstance(columns, ColumnMap) or columns is None else load_column_map(columns)
     if not path.exists():
         raise FileError(path, "does not exist")
-    if path.is_dir() and not is_bag(path):
+    if path.is_dir() and not _is_bag(path):
         entries = [entry for entry in sorted(path.iterdir()) if _holds_record(entry)]
         if not entries:
             raise FileError(path, "holds no records", expected=_kinds())
@@ -53,11 +49,6 @@ def read_all(paths: Iterable[Path | str], columns: ColumnMap | Path | str | None
     return records
 
 
-def is_bag(folder: Path) -> bool:
-    """Whether a folder is a bag, complete or left behind by a recorder."""
-    return (folder / METADATA).is_file() or any(folder.glob(f"*{BAG_SUFFIX}"))
-
-
 def _is_bag(folder: Path) -> bool:
     """Whether a folder is a bag, complete or left behind by a recorder."""
     return (folder / "metadata.yaml").is_file() or any(folder.glob(f"*{_BAG_SUFFIX}"))
@@ -70,7 +61,8 @@ def _holds_record(path: Path) -> bool:
 def _read(path: Path, columns: ColumnMap | None) -> list[Record]:
     suffix = next((s for s in sorted(_SUFFIXES, key=len, reverse=True) if path.name.lower().endswith(s)), "")
     if path.is_dir() or suffix == _BAG_SUFFIX:
-        # Here and not above: what reads bags takes long to load, and most records are tables.
+        # Here and not above: what reads bags takes long to load, most records are tables, and it needs the errors
+        # of this package itself.
         from hydraulic_sysid.records.bag_record import read_bag
 
         return read_bag(path, columns.irregular if columns else "error")

@@ -16,7 +16,7 @@ P99_DEVIATION = 0.25
 _SAME = 1e-6
 
 
-class IrregularTime(Exception):
+class IrregularTimeError(Exception):
     """Stamps that are not evenly spaced: ``index`` of the first bad one, the problem, what was expected."""
 
     def __init__(self, index: int, problem: str, expected: str) -> None:
@@ -36,11 +36,11 @@ class Sampling:
 def increasing(time: Array) -> None:
     """Check that stamps ``(N,)`` in seconds are finite and increase.
 
-    :raises IrregularTime: naming the first that does not.
+    :raises IrregularTimeError: naming the first that does not.
     """
     if not np.isfinite(time).all():
         index = int(np.flatnonzero(~np.isfinite(time))[0])
-        raise IrregularTime(index, f"the time is {time[index]}", "a number")
+        raise IrregularTimeError(index, f"the time is {time[index]}", "a number")
     steps = np.diff(time)
     if (steps > 0.0).all():
         return
@@ -49,7 +49,7 @@ def increasing(time: Array) -> None:
         problem = f"the time {time[index]:.9g} s is there twice"
     else:
         problem = f"the time goes back from {time[index]:.9g} s to {time[index + 1]:.9g} s"
-    raise IrregularTime(index + 1, problem, "increasing time")
+    raise IrregularTimeError(index + 1, problem, "increasing time")
 
 
 def gaps(time: Array) -> list[int]:
@@ -64,7 +64,7 @@ def sampling(time: Array) -> Sampling:
     well as that one (within the stamps' own deviation from it) it is the one with the fewest digits: stamps
     written with three decimals, or set by a jittering clock, still give 0.001 s.
 
-    :raises IrregularTime: not increasing, samples missing, or deviations beyond `MAX_DEVIATION`,
+    :raises IrregularTimeError: not increasing, samples missing, or deviations beyond `MAX_DEVIATION`,
         `P99_DEVIATION`.
     """
     increasing(time)
@@ -79,9 +79,10 @@ def sampling(time: Array) -> Sampling:
             problem = f"{missing} sample{'s' * (missing > 1)} missing: {stride:.6g} s since the one before"
         else:
             problem = f"only {stride:.6g} s since the sample before"
-        raise IrregularTime(index, problem, expected)
+        raise IrregularTimeError(index, problem, expected)
     count = np.arange(time.size)
-    slope = float(np.polyfit(count - count.mean(), time - time.mean(), 1)[0]) if time.size > 2 else step
+    centred = count - count.mean()
+    slope = float(centred @ time / (centred @ centred))
     largest = _deviation(time, slope).max()
     dt = slope
     for digits in range(1, 13):
@@ -92,7 +93,7 @@ def sampling(time: Array) -> Sampling:
     deviation = _deviation(time, dt)
     p99, worst = float(np.percentile(deviation, 99)), int(np.argmax(deviation))
     if deviation[worst] > MAX_DEVIATION * dt or p99 > P99_DEVIATION * dt:
-        raise IrregularTime(
+        raise IrregularTimeError(
             worst,
             f"the time {time[worst]:.9g} s is {deviation[worst]:.3g} s off the even grid "
             f"(99 % of all samples: {p99:.3g} s)",
