@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
@@ -124,12 +123,16 @@ def current(checkout: Checkout, need: Stamp) -> Plan:
 
 
 def _interpreter(ros: Ros) -> str:
+    """Real path of the first Python on the PATH that fits `ros` and starts (a pyenv shim may not)."""
     assert ros.python is not None
     name = f"python{_dotted(ros.python)}"
-    for candidate in (shutil.which(name), f"/usr/bin/{name}"):
-        probe = ["-ES", "-c", f"import sys; sys.exit(sys.version_info[:2] != {ros.python})"]
-        if candidate and os.access(candidate, os.X_OK) and not subprocess.call([candidate, *probe]):
-            return os.path.realpath(candidate)
+    question = f"import os, sys; print(sys.version_info[:2] == {ros.python} and os.path.realpath(sys.executable))"
+    for folder in (*os.get_exec_path(), "/usr/bin"):
+        candidate = Path(folder, name)
+        if os.access(candidate, os.X_OK):
+            asked = subprocess.run([candidate, "-ES", "-c", question], capture_output=True, text=True, check=False)
+            if asked.returncode == 0 and asked.stdout.strip() != "False":
+                return asked.stdout.strip()
     raise BenchError(
         f"The ROS 2 in {ros.prefix} needs Python {_dotted(ros.python)}, which is not on the PATH.",
         remedy=f"apt install {name} {name}-venv\nor call ./bench from a terminal where ROS 2 is not sourced.",
