@@ -12,6 +12,7 @@ from hydraulic_sysid.records.errors import (
 )
 from hydraulic_sysid.records.reading import read_all, read_records
 from hydraulic_sysid.records.record import Record
+from hydraulic_sysid.records.writing import save_csv, to_bag
 
 __all__ = [
     "CHANNELS",
@@ -28,5 +29,7 @@ __all__ = [
     "parse_column_map",
     "read_all",
     "read_records",
+    "save_csv",
     "shipped_maps",
+    "to_bag",
 ]
