@@ -18,9 +18,11 @@ from pathlib import Path
 from types import ModuleType
 
 import numba
+from numba.core.errors import NumbaError
 
 from . import kernels
 from .compose import Layout, write_module
+from .errors import EffectError
 from .registry import Library
 
 CACHE_VARIABLE = "HYDRAULIC_SIM_CACHE"
@@ -66,9 +68,25 @@ def _load(library: Library) -> ModuleType:
     file = cache_root() / key / f"plant_{key}.py"
     try:
         return _execute(file, text, library)
+    except NumbaError as error:
+        raise EffectError(_blame(library, error)) from error
     except Exception:  # a cache that another version or a crash left unreadable is worth one clean attempt
         shutil.rmtree(file.parent, ignore_errors=True)
+    try:
         return _execute(file, text, library)
+    except OSError:
+        raise
+    except Exception as error:
+        raise EffectError(f"the effects do not compile: {type(error).__name__}: {error}") from error
+
+
+def _blame(library: Library, error: NumbaError) -> str:
+    """What does not compile, and in which effect's file: numba's complaint, short of its way through the plant."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    files = {str(library.source_file(name)) for name in library}
+    place = next((line for line in lines for file in files if file in line), "")
+    what = next((line for line in lines if not line.startswith("Failed in nopython")), "numba does not compile it")
+    return f"the effects do not compile: {what} {place}".strip()
 
 
 def _execute(file: Path, text: str, library: Library) -> ModuleType:

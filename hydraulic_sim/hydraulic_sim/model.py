@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from . import base, slots
@@ -49,9 +50,9 @@ class Model:
     path: Path | None = None
     document: object = field(default=None, compare=False, repr=False)
 
-    @property
+    @cached_property
     def library(self) -> Library:
-        """The built-in effects and this model's own."""
+        """The built-in effects and this model's own, as its files are when it is first asked for."""
         return library(self.user_effects)
 
     def parameter(self, key: str) -> Parameter:

@@ -4,37 +4,47 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import importlib.util
 import pkgutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
-from . import base, effects, slots
+from . import base, effects, slots, trial
 from .effect import Effect, Parameter, arguments
 from .errors import EffectError
+
+
+class Found(NamedTuple):
+    """An effect, the file that defines it, and a hash of the text that was read from it."""
+
+    effect: Effect
+    path: Path
+    digest: str
 
 
 class Library(Mapping[str, Effect]):
     """Effects by name, in a fixed order (by slot, order and name), with the sources they came from."""
 
-    def __init__(self, found: Iterable[tuple[Effect, Path]]) -> None:
-        entries = list(found)
-        self._sources: dict[str, Path] = {}
-        for effect, path in entries:
-            if effect.name in self._sources:
+    def __init__(self, found: Iterable[Found]) -> None:
+        self._found: dict[str, Found] = {}
+        for entry in found:
+            effect, path, _ = entry
+            if effect.name in self._found:
                 raise EffectError(
-                    f"{path}: an effect named {effect.name!r} is already defined in {self._sources[effect.name]}"
+                    f"{path}: an effect named {effect.name!r} is already defined in {self._found[effect.name].path}"
                 )
-            self._sources[effect.name] = path
+            _check_slot(effect, path)
+            self._found[effect.name] = entry
         position = {name: i for i, name in enumerate(slots.SLOTS)}
-        ordered = sorted((e for e, _ in entries), key=lambda e: (position[e.slot], e.order, e.name))
+        ordered = sorted((e.effect for e in self._found.values()), key=lambda e: (position[e.slot], e.order, e.name))
         self._effects = {e.name: e for e in ordered}
+        self._extended: dict[tuple[tuple[Path, str], ...], Library] = {}
         for effect in ordered:
-            _check(effect, self._sources[effect.name], self)
+            _check(effect, self._found[effect.name].path, self)
 
     def __getitem__(self, name: str) -> Effect:
         try:
@@ -53,7 +63,7 @@ class Library(Mapping[str, Effect]):
 
     def source_file(self, name: str) -> Path:
         """The file that defines the effect."""
-        return self._sources[name]
+        return self._found[name].path
 
     def parameter(self, key: str) -> Parameter:
         """The parameter behind a key: ``moving_mass`` or ``coulomb_friction.force``. Raises `EffectError`."""
@@ -68,52 +78,67 @@ class Library(Mapping[str, Effect]):
 
     @cached_property
     def fingerprint(self) -> str:
-        """A hash over the text of every effect file, so that compiled physics is never stale."""
-        digest = hashlib.sha256()
-        for name in self:
-            digest.update(name.encode())
-            digest.update(self._sources[name].read_bytes())
-        return digest.hexdigest()
+        """A hash over the text that every effect was read from, so that compiled physics is never stale."""
+        return _digest("".join(f"{name} {self._found[name].digest}\n" for name in self).encode())
 
     def with_files(self, files: Iterable[str | Path]) -> Library:
         """This library and the effects of the given files. Raises `EffectError`."""
-        paths = [Path(f) for f in files]
-        if not paths:
+        added = tuple(load_effect(Path(f)) for f in files)
+        if not added:
             return self
-        mine = [(self[name], self._sources[name]) for name in self]
-        return Library(mine + [load_effect(path) for path in paths])
+        key = tuple((f.path, f.digest) for f in added)
+        if key not in self._extended:
+            extended = Library((*self._found.values(), *added))
+            for found in added:
+                trial.check_returns(found.effect, found.path)
+            self._extended[key] = extended
+        return self._extended[key]
 
 
-def load_effect(path: Path) -> tuple[Effect, Path]:
+def load_effect(path: Path) -> Found:
     """Read one effect file; its name is the file's. Raises `EffectError`, naming the file."""
     path = path.expanduser().resolve()
     if not path.is_file():
         raise EffectError(f"{path}: there is no such effect file")
-    place = hashlib.sha256(str(path).encode()).hexdigest()[:12]
-    spec = importlib.util.spec_from_file_location(f"hydraulic_sim_user_effect_{place}_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise EffectError(f"{path}: not a Python file (an effect file ends in .py)")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
+    source = path.read_bytes()
+    return Found(_executed(path, source), path, _digest(source))
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+@lru_cache(maxsize=256)
+def _executed(path: Path, source: bytes) -> Effect:
+    """The effect that ``source`` defines.
+
+    The text itself is executed, as the import system may take an edit within the same second for no edit.
+    """
+    place = _digest(str(path).encode())[:12]
+    module = ModuleType(f"hydraulic_sim_user_effect_{place}_{path.stem}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module
     try:
-        spec.loader.exec_module(module)
+        exec(compile(source, str(path), "exec"), module.__dict__)
     except Exception as error:
         raise EffectError(f"{path}: {type(error).__name__}: {error}") from error
-    return _named(module, path), path
+    return _named(module, path)
 
 
 def _named(module: ModuleType, path: Path) -> Effect:
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):
         raise EffectError(f"{path}: defines no module constant EFFECT of type Effect")
+    if not path.stem.isidentifier():
+        raise EffectError(f"{path}: an effect is named after its file, and {path.stem!r} is not a Python identifier")
     return replace(effect, name=path.stem)
 
 
-def _builtin() -> Iterator[tuple[Effect, Path]]:
+def _builtin() -> Iterator[Found]:
     for info in pkgutil.iter_modules(effects.__path__):
         module = importlib.import_module(f"{effects.__name__}.{info.name}")
         path = Path(str(module.__file__))
-        yield _named(module, path), path
+        yield Found(_named(module, path), path, _digest(path.read_bytes()))
 
 
 _BUILTIN: list[Library] = []
@@ -126,9 +151,17 @@ def library(user_files: Iterable[str | Path] = ()) -> Library:
     return _BUILTIN[0].with_files(user_files)
 
 
-def _check(effect: Effect, path: Path, found: Library) -> None:
+def _check_slot(effect: Effect, path: Path) -> None:
     if effect.slot not in slots.SLOTS:
         raise EffectError(f"{path}: slot {effect.slot!r} does not exist; slots: {', '.join(slots.SLOTS)}")
+    if effect.memory and not slots.SLOTS[effect.slot].per_sample:
+        allowed = ", ".join(name for name, slot in slots.SLOTS.items() if slot.per_sample)
+        raise EffectError(f"{path}: slot {effect.slot!r} is no place for a memory; memories are kept in: {allowed}")
+    if effect.states and effect.slot == "command":
+        raise EffectError(f"{path}: an effect on the command is evaluated once per sample and cannot have states")
+
+
+def _check(effect: Effect, path: Path, found: Library) -> None:
     own = {p.name for p in effect.parameters} | {s.name for s in effect.states}
     taken = own & (set(slots.SIGNALS) | set(slots.PER_SAMPLE) | {p.name for p in base.PARAMETERS})
     if taken:
@@ -147,11 +180,12 @@ def _check(effect: Effect, path: Path, found: Library) -> None:
                 or argument in effect.uses
                 or slots.known_at(stage, argument)
                 or (which == "kernel" and slot.kind == "chain" and argument in slot.returns)
-                or (slot.per_sample and which == "kernel" and argument in slots.PER_SAMPLE)
+                or (slot.per_sample and which == "kernel" and argument == "dt")
+                or (effect.memory and which == "kernel" and argument == "memory")
                 or argument in {p.name for p in base.PARAMETERS}
             ):
                 known = [s for s in slots.SIGNALS if slots.known_at(stage, s)]
                 raise EffectError(
                     f"{path}: {which} asks for {argument!r}, which is not known in slot {effect.slot!r}; signals known "
-                    f"there: {', '.join(known)}"
+                    f"there: {', '.join(known)}; own: {', '.join(sorted(own)) or 'none'}; memory: {effect.memory}"
                 )
