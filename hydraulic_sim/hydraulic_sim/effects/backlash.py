@@ -1,11 +1,13 @@
 """Backlash: a gap between the rod and the load.
 
-    F = m·(ω²·c + 2·ζ·ω·ḋ) while in contact, never pulling back through the gap;   d̈ = −F/m − a
+    F = m·(ω²·c + 2·ζ·ω·ḋ·r(c)) while in contact, never pulling back through the gap;   d̈ = −F/m − a
 
-d: how far the load is ahead of the rod; c = d ∓ g/2 beyond the gap g, 0 within it; ω = 2π·f of the contact. The mass m
-comes on top of moving_mass; without it (m = 0) nothing is felt.
+d: how far the load is ahead of the rod; c = d ∓ g/2 beyond the gap g, 0 within it; ω = 2π·f of the contact. Damping
+grows over the first 0.05 mm (r), so that contact is continuous. The mass m comes on top of moving_mass; without it
+(m = 0) nothing is felt.
 
-Source: Nordin & Gutman (2002), Automatica 38(10), dead-zone model of backlash.
+Source: Nordin & Gutman (2002), Automatica 38(10), dead-zone model of backlash; Hunt & Crossley (1975), J. Applied
+Mechanics 42, for damping that vanishes at first touch.
 """
 
 import math
@@ -14,16 +16,19 @@ from numba import njit
 
 from hydraulic_sim.effect import Effect, Parameter, State
 
+TOUCH = 5e-5  # m of contact over which damping grows
+
 
 @njit(error_model="numpy")
 def contact(lead, lead_rate, gap, frequency, damping):
     """Acceleration of the rod's pull on the load [m/s²], against the load's lead."""
     w = 2.0 * math.pi * frequency
-    if lead > 0.5 * gap:
-        return max(w * w * (lead - 0.5 * gap) + 2.0 * damping * w * lead_rate, 0.0)
-    if lead < -0.5 * gap:
-        return min(w * w * (lead + 0.5 * gap) + 2.0 * damping * w * lead_rate, 0.0)
-    return 0.0
+    depth = abs(lead) - 0.5 * gap
+    if depth <= 0.0:
+        return 0.0
+    side = 1.0 if lead > 0.0 else -1.0
+    grown = min(depth / TOUCH, 1.0)
+    return side * max(w * w * depth + 2.0 * damping * w * grown * side * lead_rate, 0.0)
 
 
 def force(lead, lead_rate, mass, gap, frequency, damping):
@@ -32,6 +37,12 @@ def force(lead, lead_rate, mass, gap, frequency, damping):
 
 def dynamics(lead, lead_rate, acceleration, gap, frequency, damping):
     return lead_rate, -contact(lead, lead_rate, gap, frequency, damping) - acceleration
+
+
+def rate(p):
+    """Six times that of both masses on the contact, as every touch bends the trajectory."""
+    both = (1.0 + p["mass"] / p["moving_mass"]) ** 0.5
+    return 12.0 * math.pi * p["frequency"] * both * max(1.0, p["damping"] * both) if p["mass"] > 0.0 else 0.0
 
 
 EFFECT = Effect(
@@ -66,7 +77,5 @@ EFFECT = Effect(
     excited_by="reversals, slow and fast",
     confused_with=("valve_hysteresis", "valve_deadband", "presliding"),
     told_apart_by="a width that does not depend on speed",
-    step_rate=lambda p: (
-        2.0 * math.pi * p["frequency"] * (1.0 + p["mass"] / p["moving_mass"]) ** 0.5 if p["mass"] > 0.0 else 0.0
-    ),
+    step_rate=rate,
 )
