@@ -8,6 +8,8 @@ friction and takes a force proportional to the drive.
 
 from __future__ import annotations
 
+import math
+
 from .effect import Parameter, State
 
 MERRITT = "Merritt (1967), Hydraulic Control Systems"
@@ -63,6 +65,13 @@ STATES: tuple[State, ...] = (
 # damping as in Canudas de Wit et al. (1995), IEEE Trans. Automatic Control 40(3).
 BRISTLE_LENGTH = 5e-6
 BRISTLE_TIME = 2e-3
+
+
+def dry_friction_rate(level: float, mass: float) -> float:
+    """The fastest rate [1/s] of a mass [kg] on bristles that carry a friction force [N]."""
+    stiffness = abs(level) / (BRISTLE_LENGTH * mass)
+    return max(math.sqrt(stiffness), stiffness * BRISTLE_TIME)
+
 
 OUTPUTS = (
     "position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool",

@@ -25,7 +25,7 @@ from .registry import Library
 SUBSTEP_SAFETY = 1.2  # substep × fastest pressure rate; RK4 is stable up to 2.78
 REVERSAL_BEND = 0.02  # sliding within one step, of the bristle length, from which a reversal is refined
 REVERSAL_STEP = 0.125  # and by how much
-MOST_SUBSTEPS = 2000  # in one sample; beyond, the physics is called too stiff
+MOST_SUBSTEPS = 2000  # in one sample, or per millisecond of it; beyond, the physics is called too stiff
 
 
 @dataclass(frozen=True)

@@ -81,9 +81,10 @@ class Effect:
     """A physical effect. Units are SI. See the module's docstring for the kernels' arguments.
 
     ``slot`` is a key of `slots.SLOTS` and fixes what the kernel returns; ``dynamics`` returns one entry per state
-    (for a relaxation state a pair). ``memory`` is the number of values kept between samples. ``order`` sorts
-    effects within a slot. ``step_rate`` estimates the fastest rate [1/s] that the effect brings, from parameters
-    alone, so that the integrator's step can follow it. ``always_on`` marks base physics.
+    (for a relaxation state two: its rate and its target). ``memory`` is the number of values kept between samples.
+    ``order`` sorts effects within a slot. ``step_rate`` estimates the fastest rate [1/s] that the effect brings, from
+    parameters alone, so that the integrator's step can follow it; ``reach`` says how far back [s] its memory must go
+    (one value per sample). ``always_on`` marks base physics.
     """
 
     slot: str
@@ -101,6 +102,7 @@ class Effect:
     uses: Mapping[str, str] = field(default_factory=dict)
     order: int = 0
     step_rate: Callable | None = None
+    reach: Callable | None = None
     always_on: bool = False
     name: str = ""
 

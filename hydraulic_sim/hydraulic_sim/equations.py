@@ -179,7 +179,7 @@ def run(drive, dt, start, max_step, on, P, hydraulic, X, M, Y, failure):
             if not math.isfinite(total):
                 failure[0] = now; failure[1] = 0.0
                 return k
-            if count >= {most}:
+            if count >= {most} * max(1.0, 1e3 * dt):
                 failure[0] = now; failure[1] = count
                 return k
     return len(drive)

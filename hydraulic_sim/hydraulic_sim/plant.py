@@ -7,16 +7,14 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import base
+from . import base, rates
 from .compiled import compiled
 from .errors import SimulationError
 from .model import Model
-from .registry import library
 from .trajectory import Array, PlantState, PlantValues, Trajectory
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
-STEP_TIMES_RATE = 0.6  # how much of the fastest stated rate one step may cover
 
 
 class Plant:
@@ -29,7 +27,7 @@ class Plant:
     def __init__(self, model: Model, longest_step: float = LONGEST_STEP) -> None:
         model.check_complete()
         self.model = model
-        self._compiled = compiled(library(model.user_effects))
+        self._compiled = compiled(model.library)
         layout = self._compiled.layout
         self.layout = layout
         self._on = np.zeros(len(layout.effects), dtype=np.uint8)
@@ -39,29 +37,38 @@ class Plant:
         self._parameters = np.array([model.value(key) for key in layout.parameters])
         self._hydraulic = np.uint8(model.kind == "hydraulic")
         self._remembers = any(layout.library[name].slot == "command" for name in active)
-        self.longest_step = self._step_limit(active, longest_step)
+        self._active = tuple(layout.library[name] for name in active)
+        values = self._values()
+        self.longest_step = rates.step(rates.fastest(self._active, values, model.kind), longest_step)
+        self._shortest_dt = rates.shortest_sampling(self._active, values)
 
-    def _step_limit(self, active: tuple[str, ...], longest: float) -> float:
-        values = {p.name: self.model.value(p.name) for p in base.PARAMETERS}
-        fastest = 0.0
-        for name in active:
-            effect = self.layout.library[name]
-            if effect.step_rate is not None:
-                own = {p.name: self.model.value(f"{name}.{p.name}") for p in effect.parameters}
-                fastest = max(fastest, float(effect.step_rate({**values, **own})))
-        return min(longest, STEP_TIMES_RATE / fastest) if fastest > 0 else longest
+    def _values(self) -> dict[str, float]:
+        return dict(zip(self.layout.parameters, self._parameters.tolist(), strict=True))
 
     @property
     def state_names(self) -> tuple[str, ...]:
         return tuple(self.layout.states)
 
     def with_parameters(self, values: dict[str, float]) -> Plant:
-        """This plant with other parameter values (SI); nothing is compiled. For fits: bounds are not checked."""
+        """This plant with other parameter values (SI); nothing is compiled. For fits: bounds are not checked.
+
+        The integrator's step stays as it is, so that a small change of a value changes results smoothly, unless
+        the physics becomes more than twice too fast for it. Raises `ModelError` for an unknown key.
+        """
         other = object.__new__(Plant)
         other.__dict__.update(self.__dict__)
         other._parameters = self._parameters.copy()
         for key, value in values.items():
-            other._parameters[self.layout.parameters[key]] = value
+            try:
+                other._parameters[self.layout.parameters[key]] = value
+            except KeyError:
+                self.model.parameter(key)
+                raise
+        now = other._values()
+        followed = rates.step(rates.fastest(self._active, now, self.model.kind), self.longest_step)
+        if followed < 0.5 * self.longest_step:
+            other.longest_step = followed
+        other._shortest_dt = rates.shortest_sampling(self._active, now)
         return other
 
     def value(self, key: str) -> float:
@@ -78,8 +85,8 @@ class Plant:
     ) -> PlantState:
         """A state to start from; pressures left out are those of rest.
 
-        At rest the force on the piston vanishes: p_A·A_A = p_B·A_B + load; both at half the supply for equal areas
-        (a critical-centre valve, Merritt 1967, ch. 5).
+        At rest without a load the force on the piston vanishes, p_A·A_A = p_B·A_B; both are half the supply for
+        equal areas (a critical-centre valve, Merritt 1967, ch. 5).
         """
         x = np.zeros(len(self.layout.states))
         command = max(-1.0, min(1.0, drive / self.value("drive_limit")))
@@ -108,11 +115,9 @@ class Plant:
         Raises `SimulationError` when a state stops being finite or the step cannot follow (time, state and last
         drive named).
         """
-        u = np.ascontiguousarray(drive, dtype=np.float64)
+        u = np.require(drive, np.float64, "CW")  # records are read-only, which compiled code does not take
         if u.ndim != 1 or not np.all(np.isfinite(u)):
             raise SimulationError("the drive must be a one-dimensional array of finite volts")
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise SimulationError(f"the sampling interval is {dt} s; it must be positive")
         begin = initial or self.initial_state(drive=float(u[0]) if len(u) else 0.0)
         x, memory = begin.states.copy(), begin.memory.copy()
         out = np.empty((len(u), len(base.OUTPUTS)))
@@ -139,9 +144,9 @@ class Plant:
         ``initial_states`` (S, n_states). Returns channel → (S, horizon + 1), column 0 being the start itself.
         Effects on the command remember the drive before each start. Raises `SimulationError` as `simulate` does.
         """
-        u = np.ascontiguousarray(drive, dtype=np.float64)
-        first = np.ascontiguousarray(starts, dtype=np.int64)
-        states = np.ascontiguousarray(initial_states, dtype=np.float64)
+        u = np.require(drive, np.float64, "CW")  # records are read-only, which compiled code does not take
+        first = np.require(starts, np.int64, "CW")
+        states = np.require(initial_states, np.float64, "CW")
         if len(first) and (first.min() < 0 or first.max() + horizon >= len(u)):
             raise SimulationError(
                 f"starts {first.min()}…{first.max()} and a horizon of {horizon} leave the {len(u)} samples"
@@ -150,6 +155,7 @@ class Plant:
             raise SimulationError(
                 f"initial_states has the shape {states.shape}; expected {(len(first), len(self.layout.states))}"
             )
+        self._check_dt(dt)
         out = np.empty((len(first), horizon + 1, len(base.OUTPUTS)))
         failure = np.zeros(2)
         past = LONGEST_MEMORY if self._remembers else 0
@@ -163,7 +169,16 @@ class Plant:
             )
         return {name: out[:, :, i] for i, name in enumerate(base.OUTPUTS)}
 
+    def _check_dt(self, dt: float) -> None:
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise SimulationError(f"the sampling interval is {dt} s; it must be positive")
+        if dt < self._shortest_dt:
+            raise SimulationError(
+                f"the sampling interval is {dt:g} s; the memory of a delay needs at least {self._shortest_dt:g} s"
+            )
+
     def _advance(self, u: Array, dt: float, start: float, x: Array, memory: Array, out: Array) -> None:
+        self._check_dt(dt)
         failure = np.zeros(2)
         done = self._compiled.run(
             u,
@@ -179,6 +194,7 @@ class Plant:
             failure,
         )
         if done < len(u):
+            seen = ", ".join(f"{name}={value:.6g}" for name, value in zip(base.OUTPUTS, out[done], strict=True))
             where = ", ".join(f"{name}={value:.6g}" for name, value in zip(self.layout.states, x, strict=True))
             why = (
                 "a state is no longer finite"
@@ -187,7 +203,7 @@ class Plant:
             )
             raise SimulationError(
                 f"{why} at t = {failure[0]:.6g} s (sample {done}); drive {u[done]:.6g} V, "
-                f"before it {u[max(done - 1, 0)]:.6g} V; state: {where}"
+                f"before it {u[max(done - 1, 0)]:.6g} V; at the sample: {seen}; state reached: {where}"
             )
 
     def derivative(self, state: Array, drive: float, time: float = 0.0) -> tuple[Array, dict[str, float]]:
@@ -199,7 +215,7 @@ class Plant:
         n = self.layout.n_rates
         total = len(self.layout.states)
         slope, rate, goal, seen = np.zeros(total), np.zeros(total - n), np.zeros(total - n), np.zeros(11)
-        x = np.ascontiguousarray(state, dtype=np.float64)
+        x = np.require(state, np.float64, "CW")
         command = max(-1.0, min(1.0, drive / self.value("drive_limit")))
         self._compiled.rhs(time, x, command, self._on, self._parameters, self._hydraulic, slope, rate, goal, seen)
         slope[n:] = rate * (goal - x[n:])

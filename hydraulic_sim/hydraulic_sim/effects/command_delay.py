@@ -27,4 +27,5 @@ EFFECT = Effect(
     confused_with=("spool_dynamics", "sensor_delay", "sensor_lag"),
     told_apart_by="the pressures react late too; phase grows with frequency, amplitude does not fall",
     order=10,
+    reach=lambda p: p["delay"],
 )

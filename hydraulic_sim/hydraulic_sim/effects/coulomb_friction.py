@@ -8,7 +8,7 @@ the force is continuous and a piston at rest does not creep; `presliding` gives 
 Source: Merritt (1967), Hydraulic Control Systems, ch. 6; Dahl (1968), A solid friction model.
 """
 
-from hydraulic_sim.base import BRISTLE_LENGTH, BRISTLE_TIME
+from hydraulic_sim.base import dry_friction_rate
 from hydraulic_sim.effect import Effect, Parameter
 
 
@@ -36,8 +36,5 @@ EFFECT = Effect(
     excited_by="slow triangle through standstill: the load pressure builds up while the piston sticks",
     confused_with=("valve_deadband", "backlash"),
     told_apart_by="slow triangle: load pressure builds up while stuck",
-    step_rate=lambda p: max(
-        (p["level"] / (BRISTLE_LENGTH * p["moving_mass"])) ** 0.5,
-        p["level"] * BRISTLE_TIME / (BRISTLE_LENGTH * p["moving_mass"]),
-    ),
+    step_rate=lambda p: dry_friction_rate(p["level"], p["moving_mass"]),
 )

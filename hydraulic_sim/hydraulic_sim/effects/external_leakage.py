@@ -33,4 +33,5 @@ EFFECT = Effect(
     excited_by="holding with both chambers under pressure",
     confused_with=("supply_droop", "valve_null_bias"),
     told_apart_by="common mode p_A + p_B",
+    step_rate=lambda p: 2.0 * p["coefficient"] * p["bulk_modulus"] / min(p["dead_volume_a"], p["dead_volume_b"]),
 )

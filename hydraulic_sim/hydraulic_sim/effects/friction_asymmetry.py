@@ -7,6 +7,7 @@ Unlike a load it vanishes at rest. It only takes energy together with a Coulomb 
 Source: Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4 (asymmetric friction).
 """
 
+from hydraulic_sim.base import dry_friction_rate
 from hydraulic_sim.effect import Effect, Parameter
 
 
@@ -34,4 +35,5 @@ EFFECT = Effect(
     excited_by="reversals at several loads, with rests between",
     confused_with=("constant_load", "viscous_asymmetry", "valve_null_bias"),
     told_apart_by="reversal at several loads; vanishes at rest",
+    step_rate=lambda p: dry_friction_rate(p["difference"], p["moving_mass"]),
 )

@@ -33,4 +33,5 @@ EFFECT = Effect(
     excited_by="holding under load: the piston drifts in proportion to the load pressure",
     confused_with=("viscous_friction", "valve_underlap"),
     told_apart_by="flow balance, not force balance",
+    step_rate=lambda p: 2.0 * p["coefficient"] * p["bulk_modulus"] / min(p["dead_volume_a"], p["dead_volume_b"]),
 )

@@ -5,6 +5,7 @@
 Source: Armstrong-Hélouvry, Dupont & Canudas de Wit (1994), Automatica 30(7), sec. on friction phenomena.
 """
 
+from hydraulic_sim.base import dry_friction_rate
 from hydraulic_sim.effect import Effect, Parameter
 
 
@@ -32,4 +33,5 @@ EFFECT = Effect(
     excited_by="the same speed at different positions",
     confused_with=("end_cushion", "load_spring", "coulomb_friction"),
     told_apart_by="same speed at different positions; changes sign with the direction",
+    step_rate=lambda p: dry_friction_rate(p["growth"] * (0.5 * p["stroke"]) ** 2, p["moving_mass"]),
 )

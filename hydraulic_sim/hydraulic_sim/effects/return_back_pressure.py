@@ -47,4 +47,5 @@ EFFECT = Effect(
     excited_by="fast large strokes",
     confused_with=("supply_droop",),
     told_apart_by="pressure of the draining chamber",
+    step_rate=lambda p: 2.0 * p["resistance"] * p["valve_flow"] ** 2 / p["valve_drop"] / p["time"],
 )

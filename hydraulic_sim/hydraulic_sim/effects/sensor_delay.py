@@ -27,4 +27,5 @@ EFFECT = Effect(
     confused_with=("command_delay", "sensor_lag", "spool_dynamics"),
     told_apart_by="the pressures lead the position, over frequency",
     order=10,
+    reach=lambda p: p["delay"],
 )

@@ -7,6 +7,7 @@ Source: Armstrong-Hélouvry, Dupont & Canudas de Wit (1994), Automatica 30(7), e
 
 import math
 
+from hydraulic_sim.base import dry_friction_rate
 from hydraulic_sim.effect import Effect, Parameter
 
 
@@ -36,5 +37,7 @@ EFFECT = Effect(
     excited_by="the lowest speeds, through standstill",
     confused_with=("coulomb_friction", "presliding"),
     told_apart_by="the lowest speeds: friction falls as the speed rises",
-    step_rate=lambda p: 0.86 * p["rise"] / (p["speed"] * p["moving_mass"]),
+    step_rate=lambda p: max(
+        dry_friction_rate(p["rise"], p["moving_mass"]), 0.86 * p["rise"] / (p["speed"] * p["moving_mass"])
+    ),
 )

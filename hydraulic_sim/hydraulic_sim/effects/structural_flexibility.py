@@ -24,6 +24,12 @@ def dynamics(deflection, deflection_rate, acceleration, frequency, damping):
     return deflection_rate, -w * w * deflection - 2.0 * damping * w * deflection_rate - acceleration
 
 
+def rate(p):
+    """Both masses against each other: faster than either, and stiff where the damper dominates."""
+    both = (1.0 + p["mass"] / p["moving_mass"]) ** 0.5
+    return 2.0 * math.pi * p["frequency"] * both * max(1.0, p["damping"] * both) if p["mass"] > 0.0 else 0.0
+
+
 EFFECT = Effect(
     slot="force",
     summary="a second mass behind a spring and damper",
@@ -55,7 +61,5 @@ EFFECT = Effect(
     excited_by="chirp through its resonance at several positions",
     confused_with=("entrained_air", "hose_compliance", "backlash"),
     told_apart_by="a resonance that does not move with the stroke",
-    step_rate=lambda p: (
-        2.0 * math.pi * p["frequency"] * (1.0 + p["mass"] / p["moving_mass"]) ** 0.5 if p["mass"] > 0.0 else 0.0
-    ),
+    step_rate=rate,
 )

@@ -39,4 +39,8 @@ EFFECT = Effect(
     excited_by="slow against fast large strokes",
     confused_with=("valve_flow_saturation", "return_back_pressure"),
     told_apart_by="slow against fast large strokes",
+    # the flow drawn falls with the supply pressure, most at a small drop over the lands
+    step_rate=lambda p: (
+        p["resistance"] * p["valve_flow"] / (p["valve_drop"] * p["orifice_transition"]) ** 0.5 / p["time"]
+    ),
 )

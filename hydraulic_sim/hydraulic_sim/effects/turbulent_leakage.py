@@ -34,4 +34,10 @@ EFFECT = Effect(
     excited_by="holding under several loads",
     confused_with=("internal_leakage",),
     told_apart_by="several loads: drift grows with the root of the load pressure",
+    step_rate=lambda p: (
+        2.0
+        * p["coefficient"]
+        * p["bulk_modulus"]
+        / (p["orifice_transition"] ** 0.5 * min(p["dead_volume_a"], p["dead_volume_b"]))
+    ),
 )

@@ -1,0 +1,44 @@
+"""How fast a plant's physics is: what the integrator's step and the sampling interval have to follow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from .effect import Effect
+
+STEP_TIMES_RATE = 0.6  # how much of the fastest stated rate one step may cover; RK4 is stable up to 2.7
+
+
+def fastest(effects: Iterable[Effect], values: Mapping[str, float], kind: str) -> float:
+    """The fastest rate [1/s] that the effects state for parameter ``values`` (by key), and that of the oil."""
+    rate = oil(values) if kind == "hydraulic" else 0.0
+    for effect in effects:
+        if effect.step_rate is not None:
+            rate = max(rate, float(effect.step_rate({**values, **_own(effect, values)})))
+    return rate
+
+
+def step(rate: float, longest: float) -> float:
+    """The longest step [s] that follows a rate [1/s]."""
+    return min(longest, STEP_TIMES_RATE / rate) if rate > 0.0 else longest
+
+
+def shortest_sampling(effects: Iterable[Effect], values: Mapping[str, float]) -> float:
+    """The shortest sampling interval [s] at which every effect's memory reaches as far back as it must."""
+    return max((float(e.reach(_own(e, values))) / (e.memory - 3) for e in effects if e.reach is not None), default=0.0)
+
+
+def oil(p: Mapping[str, float]) -> float:
+    """The hydraulic natural frequency [rad/s] with the piston at the stop where it is higher.
+
+    ω² = β·(A_A²/V_A + A_B²/V_B)/M, Merritt (1967), Hydraulic Control Systems, ch. 6.
+    """
+    a, b, stroke = p["piston_area_a"], p["piston_area_b"], p["stroke"]
+    near_a = a**2 / p["dead_volume_a"] + b**2 / (p["dead_volume_b"] + b * stroke)
+    near_b = b**2 / p["dead_volume_b"] + a**2 / (p["dead_volume_a"] + a * stroke)
+    return math.sqrt(p["bulk_modulus"] * max(near_a, near_b) / p["moving_mass"])
+
+
+def _own(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
+    return {p.name: values[f"{effect.name}.{p.name}"] for p in effect.parameters}
