@@ -314,6 +314,16 @@ def test_deleted_module_is_gone_after_the_build(built: FakeCheckout) -> None:
     assert not installed.exists()
 
 
+def test_build_by_another_python_leaves_nothing_behind(built: FakeCheckout) -> None:
+    remains = built.root / "ros_ws/install/pump/lib/python3.9/site-packages"
+    remains.mkdir(parents=True)
+    stamp = built.root / "ros_ws/build" / STAMP
+    stamp.write_text(stamp.read_text().replace("Python 3.", "Python 2."))
+    built.bench("build")
+    assert len(built.calls()) == 1
+    assert not remains.exists()
+
+
 @pytest.mark.parametrize("lost", ["install/pump", "install", "build", "build/pump/colcon_build.rc"])
 def test_lost_result_is_built_again(built: FakeCheckout, lost: str) -> None:
     place = built.root / "ros_ws" / lost

@@ -233,6 +233,7 @@ def test_launch_files_are_installed_and_parse(monkeypatch: pytest.MonkeyPatch) -
     handed = setup_arguments("hydraulic_bringup", monkeypatch)
     files = dict(handed["data_files"])["share/hydraulic_bringup/launch"]
     assert [Path(file).name for file in files] == sorted(p.name for p in Path("launch").glob("*.launch.py"))
+    assert "launch/bench.launch.py" in files
     for file in files:
         tree = ast.parse(Path(file).read_text(encoding="utf-8"))
         assert "generate_launch_description" in {n.name for n in tree.body if isinstance(n, ast.FunctionDef)}

@@ -23,8 +23,9 @@ def command_variables(checkout: Checkout, ros: Ros, environ: Mapping[str, str]) 
     installed = [checkout.install / name for name in checkout.packages() if (checkout.install / name).is_dir()]
     underlay = [] if ros.prefix else [checkout.venv]
     result["AMENT_PREFIX_PATH"] = joined([*installed, *underlay], environ.get("AMENT_PREFIX_PATH", ""))
-    modules = [p for prefix in installed for p in sorted(prefix.glob("lib/python3*/site-packages"))]
-    result["PYTHONPATH"] = joined(modules, environ.get("PYTHONPATH", ""))
+    versions = [folder.name for folder in checkout.venv.glob("lib/python3*")]  # one: that of its interpreter
+    modules = [prefix / "lib" / version / "site-packages" for prefix in installed for version in versions]
+    result["PYTHONPATH"] = joined(filter(Path.is_dir, modules), environ.get("PYTHONPATH", ""))
     result.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     if not ros.prefix:
         result.update(wheel_variables(checkout.venv, environ))

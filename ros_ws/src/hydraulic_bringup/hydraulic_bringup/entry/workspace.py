@@ -52,10 +52,10 @@ class Build:
             if (reason := staleness(last.get(name), files, self.key, self._result(name)))
         }
 
-    def removed(self, package: str) -> set[str]:
-        """Files of `package` that were there at the last build and are gone."""
+    def leaves_remains(self, package: str) -> bool:
+        """Whether a build over the last one would leave something: a deleted module, another Python's folder."""
         last = self._read().get(package) or {}
-        return set(last.get("files", {})) - set(self.sources[package])
+        return last.get("key", self.key) != self.key or not set(last.get("files", ())) <= set(self.sources[package])
 
     def forget(self, packages: Iterable[str]) -> None:
         """Mark `packages` as not built: the next call builds them, whatever happens to this one."""
@@ -115,9 +115,9 @@ def build(state: Build, packages: Iterable[str], environ: Mapping[str, str], loc
     :raises BenchError: with the end of colcon's output
     """
     checkout, chosen = state.checkout, sorted(packages)
-    gone = [name for name in chosen if state.removed(name)]
+    unclean = [name for name in chosen if state.leaves_remains(name)]
     state.forget(chosen)
-    for name in gone:  # colcon copies over what is there: a deleted module would stay importable
+    for name in unclean:  # colcon copies over what is there
         for part in ("build", "install"):
             shutil.rmtree(checkout.workspace / part / name, ignore_errors=True)
     everything = len(chosen) == len(state.sources)

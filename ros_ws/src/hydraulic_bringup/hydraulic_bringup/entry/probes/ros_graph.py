@@ -51,10 +51,11 @@ def _workspace(bench: Bench) -> Finding:
     except BenchError:
         return Finding("workspace", "not looked at: there is no interpreter for it", state=NOTE)
     if stale:
-        reasons = "; ".join(f"{name}: {reason}" for name, reason in stale.items())
-        if set(stale.values()) == {"not built yet"} and len(stale) == len(sources):
-            reasons = "not built yet"
-        return Finding("workspace", reasons, "./bench build (every other verb does it as well)", NOTE)
+        reasons = dict.fromkeys(stale.values())
+        found = "; ".join(f"{', '.join(n for n in stale if stale[n] == reason)}: {reason}" for reason in reasons)
+        if len(reasons) == 1 and len(stale) == len(sources):
+            found = next(iter(reasons))
+        return Finding("workspace", found, "./bench build (every other verb does it as well)", NOTE)
     files = executables([bench.checkout.install / name for name in sources])
     return Finding("workspace", f"{len(sources)} packages built, {sum(map(len, files.values()))} executables")
 
