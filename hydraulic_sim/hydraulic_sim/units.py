@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import lru_cache
 
 import pint
 
 from .errors import ModelError
+
+
+# A number in the notation of YAML and Python (no thousands separators, a point before decimals), then a unit or none.
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
 @lru_cache(maxsize=1)
@@ -20,27 +25,41 @@ def _registry() -> pint.UnitRegistry:
 def to_si(value: float | int | str, unit: str, where: str = "value") -> float:
     """``value`` in SI unit ``unit``: a number is taken to be in it, a text may carry a unit of its own.
 
-    Raises `ModelError` (naming ``where``) for text that is no quantity, a unit of another dimension, NaN or infinity.
+    Raises `ModelError` (naming ``where``) for text that is no number with a unit, a unit of another dimension, an
+    angle where there must be none (2 rad/s is not 2 Hz), NaN or infinity.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ModelError(f"{where}: {value!r} is not a number or a quantity such as '12.5 {unit}'")
-    if isinstance(value, str):
-        try:
-            quantity = _registry().Quantity(value)
-            number = (
-                float(quantity.to(unit).magnitude)
-                if not quantity.unitless or unit == "1"
-                else float(quantity.magnitude)
-            )
-        except pint.DimensionalityError as error:
-            raise ModelError(f"{where}: {value!r} is in {error.units1}, which does not convert to {unit}") from None
-        except Exception:
-            raise ModelError(f"{where}: {value!r} is not a quantity; expected for example '1.5 {unit}'") from None
-    else:
-        number = float(value)
+    number = _from_text(value, unit, where) if isinstance(value, str) else float(value)
     if not math.isfinite(number):
         raise ModelError(f"{where}: {value!r} is not finite")
     return number
+
+
+def _from_text(text: str, unit: str, where: str) -> float:
+    parts = _QUANTITY.fullmatch(text)
+    example = f"expected for example '1.5{'' if unit == '1' else ' ' + unit}'"
+    if parts is None:
+        raise ModelError(f"{where}: {text!r} is not a quantity; {example}")
+    number, own = float(parts[1]), parts[2]
+    if not own:
+        return number
+    try:
+        quantity = _registry().Quantity(number, own)
+        if _angle(quantity) != _angle(_registry().Quantity(1.0, unit)):
+            raise ModelError(f"{where}: {text!r} counts angles, which {unit} does not; give it in {unit}")
+        return float(quantity.to(unit).magnitude)
+    except pint.DimensionalityError as error:
+        raise ModelError(f"{where}: {text!r} is in {error.units1}, which does not convert to {unit}") from None
+    except ModelError:
+        raise
+    except Exception:
+        raise ModelError(f"{where}: {text!r} is not a quantity; {example}") from None
+
+
+def _angle(quantity: pint.Quantity) -> float:
+    """The power of the radian in a unit, which dimensional analysis takes for a plain number."""
+    return float(dict(quantity.to_root_units().unit_items()).get("radian", 0))
 
 
 def conversion(unit: str, si_unit: str, where: str = "unit") -> tuple[float, float]:
