@@ -22,6 +22,7 @@ class ExperimentLog:
         self._started = ""
         self._ended = ""
         self.outcome = ""
+        self.end_ns = 0
 
     def take(self, data: bytes) -> None:
         """A serialised message of the topic; one that is not an event (JSON with "event") changes nothing."""
@@ -35,10 +36,12 @@ class ExperimentLog:
             self._started, self._ended, self.outcome = text, "", ""
         elif event in ENDED and self._started:
             self._ended, self.outcome = text, str(event)
+            stamp = content.get("stamp_ns")
+            self.end_ns = stamp if isinstance(stamp, int) else 0
 
     @property
     def ended(self) -> bool:
-        """Whether the run that was heard to start has ended; `outcome` says how."""
+        """Whether the run that was heard to start has ended; `outcome` says how, `end_ns` when."""
         return bool(self._ended)
 
     def custom_data(self) -> dict[str, str]:

@@ -13,6 +13,7 @@ from hydraulic_interfaces.nodes.mailbox import Mailbox
 from hydraulic_interfaces.qos import profile
 from hydraulic_sysid.bag import BagTopic, ExperimentLog, Recording, message_type, offered_qos
 from hydraulic_sysid.bag.continuity import Continuity
+from hydraulic_sysid.bag.types import header_stamp
 
 # Messages of a topic that wait while this process is held up: five seconds at 1 kHz.
 _DEPTH = 5000
@@ -27,6 +28,8 @@ class _Channel:
         self.topic = BagTopic(name, message_type(row.type), (offered_qos(offered.depth, latched),))
         self.box = Mailbox(node, interface_class(row.type), name, profile(row.qos, _DEPTH), raw=True)
         self.continuity = Continuity()
+        self.sampled = row.publisher == "plant" and row.qos == "stream"
+        self.latest = b""
 
 
 class Intake:
@@ -49,8 +52,14 @@ class Intake:
                 received = info["received_timestamp"] or time.time_ns()
                 append(bag_topic, data, received, info["source_timestamp"] or 0, number)
                 continuity.take(number)
+                channel.latest = data
                 if bag_topic.name == self._experiment_topic:
                     self.experiment.take(data)
+
+    def reached_ns(self) -> int | None:
+        """Stamp up to which all streams of the plant have come that have come at all."""
+        latest = [channel.latest for channel in self._channels if channel.sampled and channel.latest]
+        return min(map(header_stamp, latest)) if latest else None
 
     def publishers(self) -> dict[str, int]:
         """Publishers that each topic is connected with, where there are any."""

@@ -1,7 +1,7 @@
 """Node `/actuator/recorder`: every topic of the contract, serialised as it comes, into a rosbag2 folder.
 
-`~/status` (latched JSON) says "recording" once the bag is open and the subscriptions are up, with the publishers
-they are connected with, and "closed" once the bag is finished, with the number of messages per topic.
+`~/status` (latched JSON) says "recording" once the bag is open and the subscriptions are up, with the number of
+publishers of each topic, and "closed" once the bag is finished, with the number of messages per topic.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PARAMETERS = (
     ParameterSpec("output", "", "folder of the bag; it must not exist yet"),
     ParameterSpec("description", "", "free text that goes into the bag's metadata"),
     ParameterSpec("max_duration", 0.0, "close the bag after this time; 0: never", "s", 0.0, 1e6),
-    ParameterSpec("stop_on_experiment_end", False, "close when the excitation has finished or aborted its run"),
+    ParameterSpec("stop_on_experiment_end", False, "close when an excitation run has finished or aborted"),
     ParameterSpec("exit_when_done", False, "leave once the bag is closed"),
 )
 _POLL_S = 0.02
@@ -49,14 +49,11 @@ class Recorder(Node):
     """Opens the bag at once and records until `close`; `poll` does the work, some fifty times a second."""
 
     def __init__(self) -> None:
-        """:raises BagError: the output folder exists, or cannot be made.
-
-        :raises ValueError: no output folder is given.
-        """
+        """:raises ValueError: no output folder is given, it exists or cannot be made (BagError)."""
         super().__init__(RECORDER_NODE, namespace=NAMESPACE)
         values = ParameterTable(self, PARAMETERS, locked=lambda: True).values()
         if not values["output"]:
-            raise ValueError("output: no folder given; use --ros-args -p output:=FOLDER")
+            raise ValueError("no folder given; say --ros-args -p output:=FOLDER")
         self._status = self.create_publisher(String, "~/status", profile("latched"))
         self._exit_when_done = values["exit_when_done"]
         self._rule = StopRule(values["max_duration"], values["stop_on_experiment_end"])
@@ -64,8 +61,7 @@ class Recorder(Node):
         self._recording = Recording(Path(values["output"]).expanduser().absolute(), custom)
         self._intake = Intake(self, self._recording)
         self._health = RecorderHealth(self, self._recording)
-        self.state = ""
-        self._published = ""
+        self.state = self._published = ""
         self._due = {_POLL_S: 0.0, _STATUS_S: 0.0, _DIAGNOSTICS_S: 0.0}
 
     @property
@@ -80,7 +76,8 @@ class Recorder(Node):
         clock = self.get_clock().now().nanoseconds
         if self.state in ("", "recording"):
             self._intake.drain()
-            reason = self._rule.reason(clock, time.monotonic_ns(), self._intake.experiment)
+            experiment, reached = self._intake.experiment, self._intake.reached_ns()
+            reason = self._rule.reason(clock, time.monotonic_ns(), experiment, reached)
             if reason or self._recording.error:
                 self.close(reason)
             elif self._is_due(_STATUS_S):
@@ -97,7 +94,7 @@ class Recorder(Node):
         try:
             bag = self._recording.close(self._intake.experiment.custom_data())
         except Exception as error:
-            self.get_logger().error(f"cannot write {folder}: {error}; to save what is there: recover {folder}")
+            self.get_logger().error(f"cannot write {folder}: {error}; save what is there: recover {folder}")
             self._tell("failed", error=str(error))
         else:
             figures = {"messages": bag.messages, "duration_s": bag.duration_ns * 1e-9, "bytes": bag.size}
@@ -106,8 +103,7 @@ class Recorder(Node):
         self._status.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGE_S))
 
     def _is_due(self, period: float) -> bool:
-        due = time.monotonic() >= self._due[period]
-        if due:
+        if due := time.monotonic() >= self._due[period]:
             self._due[period] = time.monotonic() + period
         return due
 
@@ -124,8 +120,8 @@ def main(argv: list[str] | None = None) -> int:
     arguments = sys.argv if argv is None else [sys.argv[0], *argv]
     rows = "\n".join(f"  {s.name} = {s.default!r} {s.unit}: {s.description}" for s in PARAMETERS)
     text = f"{__doc__}\nparameters (--ros-args -p name:=value):\n{rows}"
-    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.parse_args(remove_ros_args(arguments)[1:])
+    layout = argparse.RawDescriptionHelpFormatter
+    argparse.ArgumentParser(description=text, formatter_class=layout).parse_args(remove_ros_args(arguments)[1:])
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
