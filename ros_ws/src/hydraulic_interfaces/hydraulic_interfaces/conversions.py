@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 import struct
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Header
@@ -22,6 +23,7 @@ from hydraulic_interfaces.contract import PISTON, PLANT_FRAME, SERVOVALVE
 from hydraulic_interfaces.samples import NAN, Command, PlantSample, Reference
 
 _SECOND = 1_000_000_000
+_ENCAPSULATION = 4
 
 
 class MessageError(ValueError):
@@ -151,6 +153,19 @@ def reference_from_message(message: JointState) -> Reference:
 _MARKS = (math.pi, math.e, math.sqrt(2.0), math.sqrt(3.0), math.log(2.0))
 
 
+def _exact(message: Any) -> bytearray:
+    """The serialised message without what the middleware leaves behind it.
+
+    Its buffer has an estimated size, up to 8 bytes too many; strict readers of recorded bags refuse those.
+    """
+    buffer = bytearray(serialize_message(message))
+    with suppress(Exception):  # rclpy raises several types when the bytes no longer suffice
+        while len(buffer) > _ENCAPSULATION:
+            deserialize_message(bytes(buffer[:-1]), type(message))
+            del buffer[-1]
+    return buffer
+
+
 class _Template:
     """A serialised message in which the stamp and some numbers are overwritten in place."""
 
@@ -159,7 +174,7 @@ class _Template:
 
     def __init__(self, message: Any, *fields: tuple[float, ...]) -> None:
         """`fields`: values that stand side by side in `message` and mark where numbers go later."""
-        self._buffer = bytearray(serialize_message(message))
+        self._buffer = _exact(message)
         order = "<" if self._buffer[1] else ">"
         self._stamp = struct.Struct(f"{order}iI")
         self._fields = []
