@@ -15,27 +15,26 @@ history: []
 
 from __future__ import annotations
 
-import copy
 import io
 import os
 import tempfile
-from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.representer import RepresenterError
 
 from .effect import Parameter, check_value
 from .errors import EffectError, ModelError
 from .model import KINDS, Entry, Model, check_bounds
+from .model_document import FORMAT, document, plain
 from .registry import library
 from .units import to_si
 
 __all__ = ["Entry", "Model", "ModelError", "load_model", "presets", "save_model"]
 
-FORMAT = "hydraulic-model-1"
 TOP_KEYS = ("format", "name", "description", "plant", "parameters", "effects", "user_effects", "history")
 ENTRY_KEYS = ("value", "source", "fit", "bounds", "standard_error", "printed", "note")
 
@@ -68,20 +67,35 @@ def load_model(source: str | Path) -> Model:
 
 
 def save_model(model: Model, path: str | Path, overwrite: bool = False) -> Path:
-    """Write a model; comments of the file it was read from are kept. Raises `ModelError` if ``path`` exists.
+    """Write a model; comments of the file it was read from are kept.
 
-    The file appears whole or not at all.
+    The file appears whole or not at all. Raises `ModelError` if ``path`` exists, its folder does not, or the model
+    does not compose or holds something that has no place in a file.
     """
     target = Path(path)
     if target.exists() and not overwrite:
         raise ModelError(f"{target} exists; give another name (nothing is overwritten silently)")
+    if not target.parent.is_dir():
+        raise ModelError(f"{target}: there is no folder {target.parent}")
+    model.check_complete()
     stream = io.StringIO()
-    _yaml().dump(_document(model, target), stream)
+    try:
+        _yaml().dump(document(model, target), stream)
+    except RepresenterError as error:
+        raise ModelError(f"{target}: {error}") from None
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(stream.getvalue())
-    os.chmod(temporary, 0o644)
-    os.replace(temporary, target)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(stream.getvalue())
+        os.chmod(temporary, 0o644)
+        if overwrite:
+            os.replace(temporary, target)
+        else:
+            os.link(temporary, target)  # fails where another process was faster
+    except FileExistsError:
+        raise ModelError(f"{target} exists; give another name (nothing is overwritten silently)") from None
+    finally:
+        Path(temporary).unlink(missing_ok=True)
     return target
 
 
@@ -117,7 +131,7 @@ class _Reader:
         if kind not in KINDS:
             raise self.fail(top, "plant", f"plant is {kind!r}; allowed: {', '.join(KINDS)}")
         try:
-            files = tuple((self.path.parent / str(f)).resolve() for f in top.get("user_effects") or ())
+            files = tuple((self.path.parent / str(f)).expanduser().resolve() for f in self._list(top, "user_effects"))
             self.library = library(files)
         except EffectError as error:
             raise self.fail(top, "user_effects", str(error)) from None
@@ -141,12 +155,27 @@ class _Reader:
             entries=entries,
             effects=tuple(effects),
             user_effects=files,
-            history=tuple(dict(h) for h in top.get("history") or ()),
+            history=tuple(plain(h) for h in self._history()),
             path=self.path,
             document=top,
         )
         model.check_complete()
         return model
+
+    def _list(self, node: CommentedMap, key: str) -> CommentedSeq:
+        value = node.get(key)
+        if value is None:
+            return CommentedSeq()
+        if not isinstance(value, CommentedSeq):
+            raise self.fail(node, key, f"{key}: expected a list, found {value!r}")
+        return value
+
+    def _history(self) -> CommentedSeq:
+        history = self._list(self.document, "history")
+        for record in history:
+            if not isinstance(record, CommentedMap):
+                raise self.fail(self.document, "history", f"history: expected mappings, found {record!r}")
+        return history
 
     def _mapping(self, node: CommentedMap, key: str) -> CommentedMap:
         value = node.get(key)
@@ -187,8 +216,11 @@ class _Reader:
                 raise ModelError(f"{key}: bounds are {bounds!r}; expected [lowest, highest]")
             bounds = check_bounds(key, record, (to_si(b, record.unit, f"{key} bounds") for b in bounds))
         error = raw.get("standard_error")
+        value = check_value(record, to_si(raw["value"], record.unit, key), key)
+        if bounds is not None and not bounds[0] <= value <= bounds[1]:
+            raise ModelError(f"{key}: {value:g} {record.unit} is outside its bounds {bounds[0]:g} … {bounds[1]:g}")
         return Entry(
-            value=check_value(record, to_si(raw["value"], record.unit, key), key),
+            value=value,
             source=str(raw.get("source") or ""),
             free=None if fit is None else fit == "free",
             bounds=bounds,
@@ -196,64 +228,3 @@ class _Reader:
             printed=None if raw.get("printed") is None else str(raw["printed"]),
             note=None if raw.get("note") is None else str(raw["note"]),
         )
-
-
-def _document(model: Model, target: Path) -> CommentedMap:
-    """The YAML document of a model: the one it was read from, changed only where the model differs from it."""
-    top = copy.deepcopy(model.document) if isinstance(model.document, CommentedMap) else CommentedMap()
-    top["format"] = FORMAT
-    top["name"] = model.name
-    if model.description:
-        top["description"] = model.description
-    top["plant"] = model.kind
-    parameters = top.setdefault("parameters", CommentedMap())
-    effects = top.get("effects")
-    if not isinstance(effects, CommentedMap):
-        effects = top["effects"] = CommentedMap()
-    for name in [n for n in effects if n not in model.effects and not model.library[n].always_on]:
-        del effects[name]
-    for name in model.effects:
-        if effects.get(name) is None:
-            effects[name] = CommentedMap()
-    for key, entry in model.entries.items():
-        owner, _, name = key.rpartition(".")
-        node = effects.setdefault(owner, CommentedMap()) if owner else parameters
-        _write_entry(node, name, key, model.parameter(key), entry)
-    if model.user_effects:
-        top["user_effects"] = [os.path.relpath(f, target.resolve().parent) for f in model.user_effects]
-    top["history"] = [dict(h) for h in model.history]
-    return top
-
-
-def _write_entry(node: CommentedMap, name: str, key: str, record: Parameter, entry: Entry) -> None:
-    old = node.get(name)
-    fields: Mapping[str, object] = old if isinstance(old, CommentedMap) else {"value": old}
-    changed = old is None or to_si(fields["value"], record.unit, key) != entry.value  # type: ignore[arg-type]
-    extra: dict[str, object] = {
-        "source": entry.source or None,
-        "fit": None if entry.free is None else ("free" if entry.free else "fixed"),
-        "bounds": None if entry.bounds is None else [_quantity(b, record) for b in entry.bounds],
-        "standard_error": None if entry.standard_error is None else _quantity(entry.standard_error, record),
-        "printed": entry.printed,
-        "note": entry.note,
-    }
-    extra = {k: v for k, v in extra.items() if v is not None}
-    if not changed and not isinstance(old, CommentedMap) and not extra:
-        return
-    if not isinstance(old, CommentedMap):
-        kept = old
-        node[name] = old = CommentedMap()
-        old["value"] = kept
-    if changed:
-        old["value"] = _quantity(entry.value, record)
-    for field_name, value in extra.items():
-        if field_name == "bounds" and "bounds" in old:
-            now = [to_si(b, record.unit, key) for b in old["bounds"]]
-            if tuple(now) == entry.bounds:
-                continue
-        if old.get(field_name) != value:
-            old[field_name] = value
-
-
-def _quantity(value: float, record: Parameter) -> str:
-    return f"{value:.10g}" if record.unit == "1" else f"{value:.10g} {record.unit}"
