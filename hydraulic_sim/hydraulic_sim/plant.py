@@ -115,7 +115,7 @@ class Plant:
         Raises `SimulationError` when a state stops being finite or the step cannot follow (time, state and last
         drive named).
         """
-        u = np.require(drive, np.float64, "CW")  # records are read-only, which compiled code does not take
+        u = np.require(drive, np.float64, ("C", "W"))  # records are read-only, which compiled code does not take
         if u.ndim != 1 or not np.all(np.isfinite(u)):
             raise SimulationError("the drive must be a one-dimensional array of finite volts")
         begin = initial or self.initial_state(drive=float(u[0]) if len(u) else 0.0)
@@ -144,9 +144,9 @@ class Plant:
         ``initial_states`` (S, n_states). Returns channel → (S, horizon + 1), column 0 being the start itself.
         Effects on the command remember the drive before each start. Raises `SimulationError` as `simulate` does.
         """
-        u = np.require(drive, np.float64, "CW")  # records are read-only, which compiled code does not take
-        first = np.require(starts, np.int64, "CW")
-        states = np.require(initial_states, np.float64, "CW")
+        u = np.require(drive, np.float64, ("C", "W"))  # records are read-only, which compiled code does not take
+        first = np.require(starts, np.int64, ("C", "W"))
+        states = np.require(initial_states, np.float64, ("C", "W"))
         if len(first) and (first.min() < 0 or first.max() + horizon >= len(u)):
             raise SimulationError(
                 f"starts {first.min()}…{first.max()} and a horizon of {horizon} leave the {len(u)} samples"
@@ -215,7 +215,7 @@ class Plant:
         n = self.layout.n_rates
         total = len(self.layout.states)
         slope, rate, goal, seen = np.zeros(total), np.zeros(total - n), np.zeros(total - n), np.zeros(11)
-        x = np.require(state, np.float64, "CW")
+        x = np.require(state, np.float64, ("C", "W"))
         command = max(-1.0, min(1.0, drive / self.value("drive_limit")))
         self._compiled.rhs(time, x, command, self._on, self._parameters, self._hydraulic, slope, rate, goal, seen)
         slope[n:] = rate * (goal - x[n:])

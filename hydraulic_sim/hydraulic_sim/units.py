@@ -10,7 +10,6 @@ import pint
 
 from .errors import ModelError
 
-
 # A number in the notation of YAML and Python (no thousands separators, a point before decimals), then a unit or none.
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
