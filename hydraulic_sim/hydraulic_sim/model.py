@@ -150,6 +150,10 @@ class Model:
         if self.kind not in KINDS:
             raise ModelError(f"{self._label}: plant is {self.kind!r}; allowed: {', '.join(KINDS)}")
         self.check_laws()
+        if self.kind == "mechanical":
+            for name in self.effects:
+                if slots.SLOTS[self._effect(name).slot].hydraulic:
+                    raise ModelError(f"{self._label}: {name} acts on the oil, which a mechanical plant does not have")
         needed = [p.name for p in base.PARAMETERS if p.required]
         if self.kind == "mechanical":
             needed = ["moving_mass", "drive_force"]

@@ -88,10 +88,9 @@ def save_model(model: Model, path: str | Path, overwrite: bool = False) -> Path:
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(stream.getvalue())
         os.chmod(temporary, 0o644)
-        if overwrite:
-            os.replace(temporary, target)
-        else:
-            os.link(temporary, target)  # fails where another process was faster
+        if not overwrite:
+            target.touch(exist_ok=False)  # fails where another process was faster
+        os.replace(temporary, target)
     except FileExistsError:
         raise ModelError(f"{target} exists; give another name (nothing is overwritten silently)") from None
     finally:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 class Slot:
     """One stage. ``kind``: "law" (one effect at a time, with an ideal default), "chain" (each effect takes the
     stage's signal and returns it changed) or "sum" (contributions add). ``returns`` names what a kernel returns;
-    ``signal`` is a chain's or a law's own signal. ``subsystem`` is the balance that shows the effect."""
+    ``signal`` is a chain's or a law's own signal. ``subsystem`` is the balance that shows the effect. ``hydraulic``
+    marks a stage that a mechanical plant does not have."""
 
     name: str
     kind: str
@@ -22,6 +23,7 @@ class Slot:
     subsystem: str
     what: str
     per_sample: bool = False
+    hydraulic: bool = False
 
     @property
     def signal(self) -> str:
@@ -34,21 +36,22 @@ SLOTS: dict[str, Slot] = {
         Slot("command", "chain", ("command",), "valve", "drive to demanded opening, −1…1", per_sample=True),
         Slot("viscosity", "chain", ("viscosity",), "fluid", "factor on all viscous terms"),
         Slot("spool", "law", ("spool",), "valve", "demanded opening to spool position; ideal: equal"),
-        Slot("opening", "chain", ("opening",), "valve", "spool position to effective opening"),
+        Slot("opening", "chain", ("opening",), "valve", "spool position to effective opening", hydraulic=True),
         Slot("lands", "law", ("land_pa", "land_at", "land_pb", "land_bt"), "valve",
-             "opening to the four lands' relative openings; ideal: critical centre"),
-        Slot("supply", "law", ("pressure_supply",), "supply", "pump pressure; ideal: constant"),
-        Slot("ripple", "sum", ("pressure_supply",), "supply", "what adds to the supply pressure"),
-        Slot("tank", "law", ("pressure_tank",), "supply", "return pressure; ideal: constant"),
-        Slot("flow", "sum", ("flow_a", "flow_b"), "flow", "flow into chamber A and into chamber B besides the lands"),
+             "opening to the four lands' relative openings; ideal: critical centre", hydraulic=True),
+        Slot("supply", "law", ("pressure_supply",), "supply", "pump pressure; ideal: constant", hydraulic=True),
+        Slot("ripple", "sum", ("pressure_supply",), "supply", "what adds to the supply pressure", hydraulic=True),
+        Slot("tank", "law", ("pressure_tank",), "supply", "return pressure; ideal: constant", hydraulic=True),
+        Slot("flow", "sum", ("flow_a", "flow_b"), "flow", "flow into chamber A and into chamber B besides the lands",
+             hydraulic=True),
         Slot("compliance", "sum", ("compliance_a", "compliance_b"), "flow",
-             "capacity [m³/Pa] of the chambers beside that of the plain oil"),
+             "capacity [m³/Pa] of the chambers beside that of the plain oil", hydraulic=True),
         Slot("bristle", "law", ("bristle_length", "bristle_time"), "force",
              "how the direction of dry friction follows the motion; ideal: within microns"),
         Slot("force", "sum", ("force",), "force", "force on the piston besides the pressures"),
         Slot("position_sensor", "chain", ("reading",), "sensor", "true position to reading", per_sample=True),
         Slot("pressure_sensor", "chain", ("reading_a", "reading_b"), "sensor", "pressures to readings",
-             per_sample=True),
+             per_sample=True, hydraulic=True),
     )
 }  # fmt: skip
 
