@@ -24,7 +24,7 @@ class Bench:
         self.events: list[dict[str, Any]] = []
         self.listeners = 1
         self.session = Session(lambda event: self.events.append(json.loads(event)), lambda: self.listeners)
-        self.session.armed = PLAN
+        self.session.arm(PLAN)
         self.step_count, self.position, self.drive = 0, 0.0, 0.0
         self.apply = lambda drive: drive
         self.commands: list[float | None] = []
@@ -106,7 +106,7 @@ def test_without_states_nothing_starts():
     bench.session.armed = None
     bench.run(10)
     assert bench.session.obstacle(bench.now) == ""
-    assert bench.session.obstacle(bench.now + 0.3) == "the state of the plant"
+    assert bench.session.obstacle(bench.now + 0.6) == "the state of the plant"
 
 
 def test_a_plant_that_is_disabled_ends_the_run_with_its_own_words():
@@ -130,6 +130,18 @@ def test_a_plant_that_applies_something_else_ends_the_run():
     assert "the plant applied 0.000" in bench.events[-1]["reason"]
 
 
+def test_the_reason_holds_what_the_plant_complained_of_during_the_run():
+    bench = Bench()
+    bench.session.diagnose(COMMAND_ROW, False, "no command: drive is 0 V", {"source": ""})
+    bench.run(500)
+    bench.session.diagnose(COMMAND_ROW, False, "watchdog: no command for 0.05 s", {"source": "excitation"})
+    bench.session.diagnose(COMMAND_ROW, True, "obeys 'excitation'", {"source": "excitation"})
+    bench.position = math.nan
+    bench.run(1)
+    expected = "the position is nan; the plant says: watchdog: no command for 0.05 s"
+    assert bench.events[-1]["reason"] == expected
+
+
 def test_a_piston_that_runs_away_ends_the_run():
     bench = Bench().run(500)
     bench.position = 0.31
@@ -147,12 +159,12 @@ def test_a_position_that_is_no_number_ends_the_run():
 def test_silence_ends_the_run_with_a_last_zero():
     bench = Bench().run(500)
     last = bench.now - 0.001
-    assert bench.session.silence(last + 0.19) is None
-    stamp, drive = bench.session.silence(last + 0.25)
-    assert drive == 0.0 and stamp == START_NS + 499_000_000 + 250_000_000
+    assert bench.session.silence(last + 0.49) is None
+    stamp, drive = bench.session.silence(last + 0.75)
+    assert drive == 0.0 and stamp == START_NS + 499_000_000 + 750_000_000
     assert bench.kinds == ["started", "aborted"]
-    assert "no state for 0.250 s (allowed: 0.2 s)" in bench.events[-1]["reason"]
-    assert not bench.session.busy and bench.session.silence(last + 0.5) is None
+    assert "no state for 0.750 s (allowed: 0.5 s)" in bench.events[-1]["reason"]
+    assert not bench.session.busy and bench.session.silence(last + 2.0) is None
 
 
 def test_a_stop_ramps_down_before_it_is_announced():
@@ -174,7 +186,7 @@ def test_a_start_that_waits_can_be_called_off():
 
 def test_runs_follow_each_other():
     bench = Bench().run(1250)
-    bench.session.armed = PLAN
+    bench.session.arm(PLAN)
     bench.run(1250)
     assert bench.kinds == ["started", "finished"] * 2
     assert bench.events[2]["started_ns"] == START_NS + 1_250_000_000

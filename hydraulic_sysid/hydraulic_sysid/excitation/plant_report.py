@@ -14,25 +14,38 @@ class PlantReport:
     """The latest of the plant's two rows: is it enabled, whom does it obey, what does it complain about."""
 
     def __init__(self) -> None:
-        self._rows: dict[str, tuple[bool, str, dict[str, str]]] = {}
+        self._rows: dict[str, tuple[str, dict[str, str]]] = {}
+        self._complaints: dict[str, str] = {}
 
     def update(self, name: str, ok: bool, message: str, values: Mapping[str, str]) -> None:
         """Take a row of the diagnostics; rows of other nodes are passed over."""
-        if name in (PLANT_ROW, COMMAND_ROW):
-            self._rows[name] = (ok, message, dict(values))
+        if name not in (PLANT_ROW, COMMAND_ROW):
+            return
+        self._rows[name] = (message, dict(values))
+        if not ok:
+            self._complaints[name] = message
+        elif name == PLANT_ROW:
+            self._complaints.pop(name, None)
 
     @property
     def disabled(self) -> str:
         """Why the plant moves for nobody, in its own words; empty when it is enabled."""
-        _, message, values = self._rows.get(PLANT_ROW, (False, "no diagnostics of the plant yet", {}))
+        message, values = self._rows.get(PLANT_ROW, ("no diagnostics of the plant yet", {}))
         return "" if values.get("enabled") == "True" else message
 
     def foreign_source(self, own: str) -> str:
         """The other source that the plant obeys now; empty when there is none."""
-        source = self._rows.get(COMMAND_ROW, (True, "", {}))[2].get("source", "")
+        source = self._rows.get(COMMAND_ROW, ("", {}))[1].get("source", "")
         return "" if source == own else source
 
     @property
     def trouble(self) -> str:
-        """What the plant complains about; empty when nothing."""
-        return "; ".join(message for ok, message, _ in self._rows.values() if not ok)
+        """What the plant complains about; empty when nothing.
+
+        About commands it complains once (so many were late), hence the last such complaint since `forget` counts.
+        """
+        return "; ".join(self._complaints.values())
+
+    def forget(self) -> None:
+        """A run begins: earlier complaints are none of its business."""
+        self._complaints.clear()

@@ -30,11 +30,12 @@ class ExcitationRun:
 
     The drive comes from the time of the state, not from a count of calls: a lost state shortens nothing. The
     run aborts — 0 V at once — on a position that is no number, beyond the travel limit or too old, and on a
-    drive that the plant does not apply. It never moves again after that.
+    drive that the plant does not apply. It never moves again after that. While no state comes nothing is
+    commanded either, so that the plant's watchdog holds 0 V long before `state_timeout` ends the run.
     """
 
     def __init__(
-        self, plan: Plan, *, state_timeout: float = 0.05, applied_check: AppliedDriveCheck | None = None
+        self, plan: Plan, *, state_timeout: float = 0.5, applied_check: AppliedDriveCheck | None = None
     ) -> None:
         self.plan = plan
         self.phase = Phase.PLAYING

@@ -25,9 +25,9 @@ class Session:
 
     def __init__(self, emit: Callable[[str], None], listeners: Callable[[], int]) -> None:
         self._emit, self._listeners = emit, listeners
-        self.state_timeout, self.applied_tolerance, self.listeners_needed = 0.2, 0.1, 1
+        self.state_timeout, self.applied_tolerance, self.listeners_needed = 0.5, 0.1, 1
         self.plant = PlantReport()
-        self.armed: Plan | None = None
+        self.armed: ExcitationRun | None = None
         self.run: ExcitationRun | None = None
         self.ended: Phase | None = None  # how the last run ended
         self.last_end = ""
@@ -90,6 +90,11 @@ class Session:
         if self.run is not None and self.plant.disabled:
             self.run.abort("the plant is not enabled any more")
 
+    def arm(self, plan: Plan) -> None:
+        """Have `plan` ready: it starts with the first state for which there is no obstacle."""
+        check = AppliedDriveCheck(self.applied_tolerance)
+        self.armed = ExcitationRun(plan, state_timeout=self.state_timeout, applied_check=check)
+
     def stop(self, reason: str) -> bool:
         """End what is on or armed, on request; False when there was nothing."""
         was_busy, self.armed = self.busy, None
@@ -97,11 +102,11 @@ class Session:
             self.run.stop(reason)
         return was_busy
 
-    def _start(self, plan: Plan) -> None:
-        check = AppliedDriveCheck(self.applied_tolerance)
-        self.run = ExcitationRun(plan, state_timeout=self.state_timeout, applied_check=check)
-        self.armed, self.ended, self._announced, self._started_ns = None, None, False, self._stamp_ns
-        self._emit(experiment_event(STARTED, self.run, self._started_ns, self._stamp_ns))
+    def _start(self, run: ExcitationRun) -> None:
+        self.run, self.armed, self.ended = run, None, None
+        self._announced, self._started_ns = False, self._stamp_ns
+        self.plant.forget()
+        self._emit(experiment_event(STARTED, run, self._started_ns, self._stamp_ns))
 
     def _announce(self, run: ExcitationRun) -> None:
         if self._announced or run.phase is Phase.STOPPING:

@@ -31,10 +31,12 @@ PARAMETERS = (
     ParameterSpec("exit_when_done", False, "leave after the run: exit code 0 finished, 1 aborted", live=True),
     ParameterSpec("start_timeout", 0.0, "autostart waits no longer; 0: for ever", "s", 0.0, 3600.0),
     ParameterSpec("listeners", 1, "subscribers of command to wait for: plant, recorder, …", "", 1, 100, live=True),
-    ParameterSpec("state_timeout", 0.2, "silence of the state that aborts a run", "s", 0.01, 10.0, live=True),
+    ParameterSpec("state_timeout", 0.5, "silence of the state that aborts a run", "s", 0.01, 10.0, live=True),
     ParameterSpec("applied_tolerance", 0.1, "applied and commanded drive may differ", "V", 0.0, 10.0, live=True),
 )
 HEALTH_PERIOD_S = 0.5
+# States that wait longer are not worth an answer: a node that cannot keep up must skip some, not fall behind.
+STATE_DEPTH = 10
 
 
 class ExcitationNode(ServedNode):
@@ -52,9 +54,8 @@ class ExcitationNode(ServedNode):
         self._patience_ends, self._reported = math.inf, -math.inf
         self._leaving = False
         if self._table["autostart"]:
-            self._arm(plan)
-            self._patience_ends = time.monotonic() + (self._table["start_timeout"] or math.inf)
-        self.create_subscription(JointState, "state", self._on_state, profile("state"))
+            self._arm(plan, self._table["start_timeout"] or math.inf)
+        self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, profile("diagnostics"))
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/abort", self._on_abort)
@@ -88,11 +89,12 @@ class ExcitationNode(ServedNode):
         for publisher in (self._experiment, self._command):
             publisher.wait_for_all_acked(Duration(seconds=1))
 
-    def _arm(self, plan: Plan) -> None:
+    def _arm(self, plan: Plan, patience: float) -> None:
+        self._patience_ends = time.monotonic() + patience
         self._session.state_timeout = self._table["state_timeout"]
         self._session.applied_tolerance = self._table["applied_tolerance"]
         self._session.listeners_needed = self._table["listeners"]
-        self._session.armed = plan
+        self._session.arm(plan)
 
     def _tell(self, event: str) -> None:
         self._experiment.publish(String(data=event))
@@ -125,7 +127,7 @@ class ExcitationNode(ServedNode):
         if obstacle:
             response.message = f"refused: {obstacle}"
         else:
-            self._arm(plan)
+            self._arm(plan, math.inf)
             response.success, response.message = True, f"starting {plan.name}, {plan.total_time:g} s"
         return response
 
