@@ -152,6 +152,26 @@ def test_every_experiment_is_a_record_and_one_that_was_aborted_says_so(tmp_path:
     assert "experiment: the bag does not hold its end" in second.notes
 
 
+def test_an_experiment_that_ended_at_once_is_left_out(tmp_path: Path) -> None:
+    at_once = [event("started", START + 10 * MS), event("aborted", START + 10 * MS, reason="not enabled")]
+    later = [event("started", START + 50 * MS), event("finished", START + 80 * MS)]
+    (record,) = read_records(bag(tmp_path / "run", [*streams(), *at_once, *later]))
+    assert (record.name, len(record)) == ("run", 30)
+    assert "experiment: 1 more in the bag ended at once" in record.notes
+    with pytest.raises(BagError, match="every experiment in it ended before its second sample"):
+        read_records(bag(tmp_path / "none", [*streams(), *at_once]))
+
+
+def test_the_end_belongs_to_the_experiment_that_it_names(tmp_path: Path) -> None:
+    events = [
+        event("started", START + 10 * MS, started_ns=7),
+        event("aborted", START + 20 * MS, started_ns=3),
+        event("finished", START + 60 * MS, started_ns=7),
+    ]
+    (record,) = read_records(bag(tmp_path / "run", [*streams(), *events]))
+    assert len(record) == 50 and record.description["experiment"]["event"] == "finished"
+
+
 def test_the_end_of_an_earlier_experiment_and_talk_on_the_topic_change_nothing(tmp_path: Path) -> None:
     chatter = [("experiment", START + 5, STORE.types[STRING](text)) for text in ("", "hello", "[1]", '{"event": 1}')]
     events = [event("finished", START - 5 * MS), event("started", START - 10 * MS), *chatter]

@@ -6,10 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from hydraulic_sysid.bag.metadata import FILE_NAME
 from hydraulic_sysid.records.errors import BagError
-
-SUFFIX = ".mcap"
-METADATA = "metadata.yaml"
 
 
 @dataclass
@@ -37,9 +35,9 @@ def read(path: Path, topics: Iterable[str]) -> Bag:
     """
     from rosbags.rosbag2 import Reader
 
-    if path.is_dir() and not (path / METADATA).is_file():
+    if path.is_dir() and not (path / FILE_NAME).is_file():
         hint = f"make it whole with: python -m hydraulic_sysid recover {path}"
-        raise BagError(path, f"the bag was not closed (no {METADATA}); {hint}")
+        raise BagError(path, f"the bag was not closed (no {FILE_NAME}); {hint}")
     wanted = set(topics)
     try:
         with Reader(path) as reader:
@@ -57,5 +55,5 @@ def read(path: Path, topics: Iterable[str]) -> Bag:
         raise BagError(path, f"the bag is cut off or damaged ({text}); save what is there with: {hint}") from None
     found = sum(len(stream.payloads) for stream in streams.values())
     if found != expected:
-        raise BagError(path, f"{found} messages", expected=f"{expected}, as {METADATA} says")
+        raise BagError(path, f"{found} messages", expected=f"{expected}, as {FILE_NAME} says")
     return Bag(path, streams, types, {str(key): str(value) for key, value in custom.items()})

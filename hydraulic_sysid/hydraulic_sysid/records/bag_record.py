@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import PISTON, SERVOVALVE, topic
 from hydraulic_sysid.bag import cdr, reader
-from hydraulic_sysid.bag.reader import SUFFIX, Bag
+from hydraulic_sysid.bag.reader import Bag
+from hydraulic_sysid.bag.writer import SUFFIX
 from hydraulic_sysid.records.errors import BagError, TimeError
 from hydraulic_sysid.records.experiments import Span, spans
 from hydraulic_sysid.records.record import Record
@@ -61,8 +62,6 @@ def _records(
     custom: Mapping[str, str],
 ) -> list[Record]:
     chosen = slice(span.first, span.last)
-    if span.last - span.first < 2:
-        raise BagError(path, f"{span.last - span.first} samples in {span.what}", expected="at least two")
     start = int(stamps[span.first])
     samples = Samples(
         path,

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import topic
+from hydraulic_sysid.bag.experiment import ENDED, STARTED
 from hydraulic_sysid.bag.reader import Bag
 from hydraulic_sysid.bag.types import string_data
-
-STARTED = "started"
-ENDED = ("finished", "aborted")
+from hydraulic_sysid.records.errors import BagError
 
 
 @dataclass(frozen=True)
@@ -27,40 +27,53 @@ class Span:
     experiment: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
 
-    @property
-    def what(self) -> str:
-        """For error texts."""
-        return f"experiment {self.name or 'in the bag'}" if self.experiment else "the bag"
-
 
 def spans(bag: Bag, stamps: NDArray[np.int64]) -> list[Span]:
     """One span per experiment that starts within the ``stamps`` (N,), or one over all if none does.
 
-    An experiment without an end lasts until the next one or the end of the bag.
+    An experiment without an end lasts until the next one or the end of the bag. One that ended before its second
+    sample is left out, and noted in the others.
+
+    :raises BagError: all of them did.
     """
     stream = bag.streams.get(topic("experiment"))
     events = [event for event in map(_event, stream.payloads if stream else ()) if event is not None]
-    starts = [i for i, event in enumerate(events) if event.get("event") == STARTED]
-    starts = [i for i in starts if stamps[0] <= int(events[i]["stamp_ns"]) <= stamps[-1]]
+    starts = [
+        index
+        for index, event in enumerate(events)
+        if event.get("event") == STARTED and stamps[0] <= event["stamp_ns"] <= stamps[-1]
+    ]
     if not starts:
         return [Span(0, int(stamps.size))]
-    found = []
-    for number, index in enumerate(starts):
-        begin, following = events[index], events[index + 1 :]
-        end = next((e for e in following if e.get("event") in (*ENDED, STARTED)), None)
-        notes = []
-        experiment = {**begin}
-        until = int(stamps[-1]) + 1 if end is None else int(end["stamp_ns"])
-        if end is None or end.get("event") == STARTED:
-            notes.append("experiment: the bag does not hold its end")
-        else:
-            experiment.update(event=end["event"], reason=end.get("reason", ""), end_stamp_ns=until)
-            if end["event"] != "finished":
-                notes.append(f"experiment: {end['event']} ({end.get('reason') or 'no reason given'})")
-        first, last = np.searchsorted(stamps, [int(begin["stamp_ns"]), until], side="left")
-        name = f"{number + 1}" if len(starts) > 1 else ""
-        found.append(Span(int(first), int(last), name, experiment, notes))
-    return found
+    found = [_span(events[index], events[index + 1 :], stamps) for index in starts]
+    usable = [span for span in found if span.last - span.first > 1]
+    if len(usable) < len(found):
+        note = f"experiment: {len(found) - len(usable)} more in the bag ended at once"
+        usable = [replace(span, notes=[*span.notes, note]) for span in usable]
+    if len(usable) > 1:
+        usable = [replace(span, name=str(number)) for number, span in enumerate(usable, 1)]
+    if not usable:
+        raise BagError(bag.path, "every experiment in it ended before its second sample", expected="one to read")
+    return usable
+
+
+def _span(begin: dict[str, Any], following: Sequence[dict[str, Any]], stamps: NDArray[np.int64]) -> Span:
+    """Samples of the experiment that ``begin`` starts, up to its own end or the next start."""
+    run = begin.get("started_ns")
+    end = next(
+        (e for e in following if e.get("event") == STARTED or (e.get("event") in ENDED and e.get("started_ns") == run)),
+        None,
+    )
+    notes, experiment = [], {**begin}
+    until = int(stamps[-1]) + 1 if end is None else end["stamp_ns"]
+    if end is None or end.get("event") == STARTED:
+        notes.append("experiment: the bag does not hold its end")
+    else:
+        experiment.update(event=end["event"], reason=end.get("reason", ""), end_stamp_ns=until)
+        if end["event"] != "finished":
+            notes.append(f"experiment: {end['event']} ({end.get('reason') or 'no reason given'})")
+    first, last = np.searchsorted(stamps, [begin["stamp_ns"], until], side="left")
+    return Span(int(first), int(last), "", experiment, notes)
 
 
 def _event(payload: bytes) -> dict[str, Any] | None:
