@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hydraulic_sysid.excitation import (
@@ -56,6 +56,7 @@ def plan_mapping(**changes):
     return {"name": "any", "signal": signal, "travel_limit": 0.5, "duration": 4.0, **changes}
 
 
+@settings(deadline=None)
 @given(PLANS)
 def test_the_drive_is_bounded_finite_and_zero_at_both_ends(plan):
     drive = plan.open_loop
@@ -67,6 +68,7 @@ def test_the_drive_is_bounded_finite_and_zero_at_both_ends(plan):
     assert drive[0] == drive[-1] == 0.0
 
 
+@settings(deadline=None)
 @given(PLANS)
 def test_a_plan_survives_yaml_and_json(plan):
     twin = Plan.from_mapping(yaml.safe_load(yaml.safe_dump(plan.as_mapping())))

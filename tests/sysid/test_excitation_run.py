@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hydraulic_sysid.excitation import AppliedDriveCheck, ExcitationRun, Phase, Plan, load_plan, shipped_plans
@@ -91,6 +91,7 @@ def test_it_is_centring_that_holds_the_piston():
     assert abs(last_position(4.0)) < 0.15
 
 
+@settings(deadline=None)
 @given(st.floats(-3, 3), st.floats(0, 1000), st.floats(0, 10), st.floats(1.1, 10))
 def test_no_position_drives_beyond_the_limit(position, gain, authority, limit):
     chosen = plan(

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hydraulic_sysid.excitation import PlanError, PlaybackError, signal_kinds
@@ -40,6 +40,7 @@ def test_the_folder_is_the_list():
     assert signal_kinds()["chirp"] is Chirp
 
 
+@settings(deadline=None)
 @given(CHIRPS)
 def test_chirp_is_bounded_and_has_the_stated_frequency(chirp):
     assert np.abs(chirp.sample(TIMES)).max() <= chirp.amplitude
@@ -58,6 +59,7 @@ def test_chirp_is_bounded_and_has_the_stated_frequency(chirp):
     np.testing.assert_allclose(step / (2 * np.pi * h), chirp.frequency(t + h / 2), rtol=1e-5)
 
 
+@settings(deadline=None)
 @given(CHIRPS)
 def test_chirp_frequency_runs_from_start_to_end(chirp):
     ends = chirp.frequency(np.array([0.0, chirp.sweep_time * (1 - 1e-12)]))
@@ -96,6 +98,7 @@ def test_schroeder_phases_lower_the_peak():
     assert peaks["schroeder"] < 0.5 * peaks["zero"]
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 3.0))
 def test_random_phase_multisine_is_flat_in_its_band_and_periodic(seed, rms):
     signal = RandomPhaseMultisine(rms=rms, period=5.0, frequency_min=0.4, frequency_max=12.0, seed=seed)
@@ -119,6 +122,7 @@ def test_random_phases_follow_the_seed():
     assert drive(1)[0] == pytest.approx(-0.5916282734616882, rel=1e-12)
 
 
+@settings(deadline=None)
 @given(AMPLITUDE, st.floats(0.1, 50.0))
 def test_triangle_rises_from_zero_to_its_peaks(amplitude, frequency):
     triangle = Triangle(amplitude, frequency)
@@ -130,6 +134,7 @@ def test_triangle_rises_from_zero_to_its_peaks(amplitude, frequency):
     np.testing.assert_allclose(slope, slope[0], rtol=1e-6)
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-10, 10), min_size=1, max_size=8), st.integers(2, 700))
 def test_steps_hold_each_level_for_the_same_number_of_samples(levels, samples):
     steps = Steps(levels, samples / 1000.0)
