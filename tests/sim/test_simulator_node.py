@@ -17,7 +17,7 @@ MODEL = "sample_bench"
 
 
 @pytest.fixture
-def start(launch: Any) -> Callable[..., Any]:
+def start(launch: Any, compiled_physics: None) -> Callable[..., Any]:
     def run(*parameters: str, autostart: bool = True) -> Any:
         options = ["--autostart"] if autostart else []
         given = [f"model:={MODEL}", "watchdog:=2.0", "enable_on_activate:=true", *parameters]
