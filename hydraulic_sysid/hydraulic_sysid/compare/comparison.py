@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,11 +65,7 @@ def compare(
     for record in records:
         check(record, settings.horizon)
     plant = Plant(model)
-    compared = []
-    for index, record in enumerate(records):
-        if progress is not None:
-            progress(record.name)
-        compared.append(run(model, plant, record, settings.horizon, seed=index))
+    compared = _run_all(model, plant, records, settings, progress)
     channels = [name for name in UNITS if any(name in c.data.compared for c in compared)]
     maps = error_maps(compared, channels)
     documents = [
@@ -98,6 +96,20 @@ def compare(
         "error_maps": _plain_maps(maps),
         "records": documents,
     }
+
+
+def _run_all(
+    model: Model, plant: Plant, records: Sequence[Record], settings: Settings, progress: Progress | None
+) -> list[Compared]:
+    """All records in their order; the plant's kernels run beside each other on as many cores as there are."""
+
+    def one(index: int) -> Compared:
+        if progress is not None:
+            progress(records[index].name)
+        return run(model, plant, records[index], settings.horizon, seed=index)
+
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        return list(pool.map(one, range(len(records))))
 
 
 def error_maps(compared: Sequence[Compared], channels: Sequence[str]) -> dict[str, dict[str, ErrorMap]]:
@@ -149,6 +161,7 @@ def _pooled(documents: Sequence[dict[str, Any]], channel: str) -> dict[str, Any]
             "rmse": rmse,
             "exact_rmse": exact,
             "nrmse": rmse / spread if spread > 0.0 else float("nan"),
+            "bias": float(np.average([p[mode]["bias"] for _, p in parts], weights=samples)),
             "ratio": rmse / exact if exact > 0.0 else float("nan"),
             "worst_record": max(parts, key=lambda part: part[1][mode]["rmse"])[0],
         }
@@ -169,6 +182,8 @@ def _findings(
         found.append(size)
         if size.kind == "at_floor":
             continue
+        constant = findings.bias_finding(channel, unit, at["bias"], at["rmse"])
+        found += [constant] if constant is not None else []
         units = {**VARIABLES, "direction": "1"}
         patterns = [findings.map_finding(channel, unit, v, units[v], m) for v, m in maps[channel].items()]
         ranked = sorted((p for p in patterns if p is not None), key=lambda p: -p.weight)
@@ -187,7 +202,7 @@ def _findings(
             free["drift"], free["rmse_detrended"], free["rmse"], document["name"], document["duration"]
         )
         found += [drift] if drift is not None else []
-    order = {"above_floor": 0, "at_floor": 0, "depends_on": 1, "amplitude": 2, "frequency": 3, "drift": 4}
+    order = {"above_floor": 0, "at_floor": 0, "bias": 1, "depends_on": 1, "amplitude": 2, "frequency": 3, "drift": 4}
     return sorted(found, key=lambda f: (order[f.kind], -f.weight))
 
 
@@ -204,7 +219,7 @@ def _verdict(summary: dict[str, dict[str, Any]], found: Sequence[Finding], setti
         f"{number(at[missed[0]]['ratio'])} times ({TITLES[missed[0]]}) what an exact model would show "
         "at this noise."
     )
-    patterns = [f for f in found if f.kind == "depends_on" and f.numbers["explained"] >= _HEADLINE_SHARE]
+    patterns = [f for f in found if f.kind in ("bias", "depends_on") and f.weight >= _HEADLINE_SHARE]
     if patterns:
         text += f" {patterns[0].text}"
     else:

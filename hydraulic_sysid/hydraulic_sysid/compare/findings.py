@@ -24,6 +24,7 @@ AT_FLOOR = 1.5
 """Errors up to this multiple of what an exact model would show are called explained."""
 WORTH_SAYING = 0.1
 """Least cross-validated share of the error's variance for which a variable is named, if chance stays below it."""
+_MOSTLY = 0.5  # of the mean square: from here on an error is called mostly constant
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,22 @@ def size_finding(channel: str, unit: str, rmse: float, exact: float, noise: floa
         )
         return Finding(channel, "at_floor", text, 0.0, numbers)
     text = (
-        f"{title} is missed by {quantity(rmse, unit)} RMS {horizon:g} s ahead, {ratio:.1f} times the "
+        f"{title} is missed by {quantity(rmse, unit)} RMS {horizon:g} s ahead, {number(ratio)} times the "
         f"{quantity(exact, unit)} that an exact model would show at this noise."
     )
     return Finding(channel, "above_floor", text, ratio, numbers)
+
+
+def bias_finding(channel: str, unit: str, bias: float, rmse: float) -> Finding | None:
+    """Whether most of an error is one constant."""
+    share = (bias / rmse) ** 2 if rmse > 0.0 else 0.0
+    if share < _MOSTLY:
+        return None
+    text = (
+        f"The {TITLES[channel]} error is mostly constant: its mean of {quantity(bias, unit)} makes "
+        f"{100 * share:.0f} % of its mean square."
+    )
+    return Finding(channel, "bias", text, share, {"bias": bias, "share": share})
 
 
 def map_finding(channel: str, unit: str, variable: str, variable_unit: str, m: ErrorMap) -> Finding | None:
@@ -101,7 +114,7 @@ def _direction_shape(m: ErrorMap, unit: str) -> tuple[str, dict[str, Any]]:
         return "differs between standing and moving", {"means": by_sign}
     numbers = {"mean_retracting": back, "mean_extending": forth}
     pair = f"mean {quantity(forth, unit)} extending, {quantity(back, unit)} retracting"
-    if back * forth < 0.0 and min(abs(back), abs(forth)) > 0.2 * max(abs(back), abs(forth)):
+    if _opposite(back, forth):
         return f"changes sign with the direction of motion: {pair}", numbers
     larger = "extending" if abs(forth) > abs(back) else "retracting"
     return f"is larger when {larger}: {pair}", numbers
@@ -126,13 +139,13 @@ def _curve_shape(m: ErrorMap, unit: str, variable: str, variable_unit: str) -> t
     numbers["linear_correlation"] = slope
     if variable in ("velocity", "drive", "spool", "load_pressure") and m.center[0] < 0.0 < m.center[-1]:
         odd = odd_share(m)
-        numbers["odd_share"] = odd
-        if odd >= 0.8:
-            below, above = _half_means(m)
-            numbers |= {"mean_below_zero": below, "mean_above_zero": above}
+        below, above = _half_means(m)
+        numbers |= {"odd_share": odd, "mean_below_zero": below, "mean_above_zero": above}
+        if odd >= 0.8 and _opposite(below, above):
             if abs(slope) >= 0.95:
                 return f"is nearly proportional to {title}: {spread}", numbers
-            return f"changes sign with {title}: {spread}", numbers
+            sides = f"mean {quantity(above, unit)} above zero, {quantity(below, unit)} below"
+            return f"changes sign with {title}: {sides}", numbers
         if odd <= 0.2:
             return f"depends on the size of {title}, not on its sign: {spread}", numbers
     if abs(slope) >= 0.9:
@@ -150,6 +163,11 @@ def odd_share(m: ErrorMap) -> float:
     odd, even = 0.5 * (right - left), 0.5 * (right + left)
     power = float(np.sum(odd**2) + np.sum(even**2))
     return float(np.sum(odd**2)) / power if power > 0.0 else 0.0
+
+
+def _opposite(one: float, other: float) -> bool:
+    """Whether two means have opposite signs and neither is a mere trace of the other."""
+    return one * other < 0.0 and min(abs(one), abs(other)) > 0.2 * max(abs(one), abs(other))
 
 
 def _half_means(m: ErrorMap) -> tuple[float, float]:

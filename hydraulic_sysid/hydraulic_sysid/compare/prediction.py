@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from hydraulic_sim.model_file import Model
-from hydraulic_sim.plant import Plant, Trajectory
+from hydraulic_sim.plant import Plant, PlantState
 from hydraulic_sysid.records import Record
 
 from .channels import Measured, load_pressure
@@ -71,32 +71,42 @@ def check(record: Record, horizon: float) -> None:
         )
 
 
-def predict(model: Model, plant: Plant, data: Measured, horizon: float) -> Predictions:
-    """Run the plant beside a record in all three ways."""
+def start(plant: Plant, data: Measured) -> PlantState:
+    """The state at a record's first sample: measured where there is a measurement, at rest elsewhere."""
+    first = {name: float(values[0]) for name, values in _start_values(data, smoothed=True).items()}
+    return plant.initial_state(**first, drive=float(data.record["drive"][0]))
+
+
+def inner_states(plant: Plant, data: Measured) -> Array:
+    """All states of the free run ``(N, n_states)``, each at its sample."""
+    live = plant.live(start(plant, data))
+    dt = data.record.dt
+    states = np.empty((len(data.record), len(plant.state_names)))
+    for k, volts in enumerate(data.record["drive"].tolist()):
+        states[k] = live.state.states
+        live.step(volts, dt)
+    return states
+
+
+def predict(model: Model, plant: Plant, data: Measured, horizon: float, inner: Array) -> Predictions:
+    """Run the plant beside a record in all three ways; ``inner`` are the states of its free run."""
     record = data.record
     drive = record["drive"].copy()  # a record's arrays are read-only, which the plant's kernels do not take
     dt, count = record.dt, len(record)
     ahead = int(round(horizon / dt))
     stride = max(1, ahead // TILES)
     smooth = _start_values(data, smoothed=True)
-    begin = plant.initial_state(
-        float(smooth["position"][0]),
-        float(smooth["velocity"][0]),
-        _first(smooth.get("pressure_a")),
-        _first(smooth.get("pressure_b")),
-        float(drive[0]),
-    )
-    run = plant.simulate(drive, dt, begin)
+    run = plant.simulate(drive, dt, start(plant, data))
     free = {name: run[name] for name in _SENSED}
     # Each run goes on for half the derivative filter: its velocity is filtered as the measured one is.
     beyond = ahead + data.velocity_filter.half
     starts = np.arange(0, count - beyond, stride)
-    runs = plant.predict(drive, dt, starts, beyond, _states(plant, smooth, run, starts))
+    runs = plant.predict(drive, dt, starts, beyond, _states(plant, smooth, inner, starts))
     leads = {name: runs[name][:, : ahead + 1] for name in _SENSED}
     leads["velocity"] = data.velocity_filter(runs["position"])[:, : ahead + 1]
     every = np.arange(count - 1)
     raw = _start_values(data, smoothed=False)
-    step = plant.predict(drive, dt, every, 1, _states(plant, raw, run, every))
+    step = plant.predict(drive, dt, every, 1, _states(plant, raw, inner, every))
     finish = _finisher(model, data)
     free["velocity"] = data.velocity_filter(free["position"])
     ahead_channels = finish(leads)
@@ -115,10 +125,6 @@ def predict(model: Model, plant: Plant, data: Measured, horizon: float) -> Predi
     )
 
 
-def _first(values: Array | None) -> float | None:
-    return None if values is None else float(values[0])
-
-
 def _start_values(data: Measured, smoothed: bool) -> dict[str, Array]:
     values: dict[str, Array] = {
         n: data.channels[n] for n in ("position", "pressure_a", "pressure_b") if n in data.channels
@@ -128,19 +134,11 @@ def _start_values(data: Measured, smoothed: bool) -> dict[str, Array]:
     return {**values, "velocity": data.channels["velocity"]}
 
 
-def _states(plant: Plant, values: dict[str, Array], run: Trajectory, starts: NDArray[np.int64]) -> Array:
+def _states(plant: Plant, values: dict[str, Array], inner: Array, starts: NDArray[np.int64]) -> Array:
     """Initial states ``(S, n_states)``: measured where there is a measurement, of the free run elsewhere."""
-    names = plant.state_names
-    states = np.tile(plant.initial_state().states, (starts.size, 1))
-    command = np.clip(run.drive / plant.value("drive_limit"), -1.0, 1.0)
-    for name in names:
-        column = names.index(name)
-        if name in values:
-            states[:, column] = values[name][starts]
-        elif name in ("pressure_a", "pressure_b"):
-            states[:, column] = run[f"true_{name}"][starts]
-        elif plant.layout.state_records[name].initial == "command":
-            states[:, column] = command[np.maximum(starts - 1, 0)]
+    states = inner[starts]
+    for name, measurement in values.items():
+        states[:, plant.state_names.index(name)] = measurement[starts]
     return states
 
 

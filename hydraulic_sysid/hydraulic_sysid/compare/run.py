@@ -12,7 +12,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.records import Record
 
 from .channels import Measured, measured
-from .prediction import Predictions, predict
+from .prediction import Predictions, inner_states, predict
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,8 @@ class Compared:
 def run(model: Model, plant: Plant, record: Record, horizon: float, seed: int = 0) -> Compared:
     """Predictions of a record and of its twin (its noise drawn with ``seed``)."""
     data = measured(record, model)
-    runs = predict(model, plant, data, horizon)
+    inner = inner_states(plant, data)
+    runs = predict(model, plant, data, horizon, inner)
     rng = np.random.default_rng(seed)
     channels = {"drive": record["drive"]}
     for name in ("position", "pressure_a", "pressure_b", "pressure_supply", "spool"):
@@ -55,4 +56,4 @@ def run(model: Model, plant: Plant, record: Record, horizon: float, seed: int = 
     if "spool" in record:
         channels["spool"] = channels["spool"] * model.value("spool_travel")
     twin = replace(measured(replace(record, channels=channels), model, data.velocity_filter), noise=data.noise)
-    return Compared(data, runs, twin, predict(model, plant, twin, horizon))
+    return Compared(data, runs, twin, predict(model, plant, twin, horizon, inner))

@@ -22,7 +22,7 @@ def overlay(result: Result, record: int) -> go.Figure:
     """Measured and simulated channels of one record, the error beneath each, all on one time axis."""
     document = result["records"][record]
     channels = [name for name in result["channels"] if name in document["channels"]]
-    heights = [0.7] + [1.5, 0.9] * len(channels)
+    heights = [0.9] + [1.6, 1.0] * len(channels)
     panels = Panels(len(heights), heights=heights, gap=(0.0, 0.011), one_time=True)
     _trace(panels, 0, document["drive"], 1.0, "drive", style.MEASURED, 1.2, legend=False)
     panels.y_axis(0, "drive<br>[V]", nticks=5)
@@ -43,7 +43,7 @@ def overlay(result: Result, record: int) -> go.Figure:
         panels.y_axis(panel, f"{result['channels'][name]['title']}<br>[{unit}]", nticks=5)
         panels.y_axis(panel + 1, f"error<br>[{unit}]", nticks=5)
     panels.x_axis(0, "time [s]", anchor=f"y{len(heights)}", mirror="all")
-    return panels.figure(90 + int(68 * sum(heights)), hovermode="x unified", hoversubplots="axis")
+    return panels.figure(110 + int(66 * sum(heights)), hovermode="x unified", hoversubplots="axis")
 
 
 def error_maps(result: Result, channel: str, record: int | None = None) -> go.Figure:
@@ -145,9 +145,9 @@ def _log_panels(
 
 
 def _log_axis(data: list[float]) -> dict[str, Any]:
-    """A logarithmic axis whose ticks do not crowd: 1, 2, 5 over a decade or two, else every decade or two."""
+    """A logarithmic axis whose ticks do not crowd: 1, 2, 5 over a decade or two, else decades."""
     decades = float(np.log10(max(data) / min(data))) if data else 1.0
-    ticks = "D2" if decades < 1.7 else 1 if decades < 4.5 else 2
+    ticks = "D1" if decades < 0.6 else "D2" if decades < 1.7 else 1 if decades < 4.5 else 2
     return {"type": "log", "tickformat": "~g", "dtick": ticks}
 
 

@@ -12,6 +12,7 @@ from .html import Figures, choice, made_on, more, section, table, tag, text
 
 Result = dict[str, Any]
 
+_PATTERNS = ("bias", "depends_on")
 _CARDS = ("position", "velocity", "pressure_a", "load_pressure")
 
 
@@ -130,8 +131,8 @@ def _times(ratio: float | None) -> str:
 
 
 def _findings(result: Result) -> str:
-    first = [f for f in result["findings"] if f["kind"] == "depends_on"]
-    rest = [f for f in result["findings"] if f["kind"] != "depends_on"]
+    first = [f for f in result["findings"] if f["kind"] in _PATTERNS]
+    rest = [f for f in result["findings"] if f["kind"] not in _PATTERNS]
     lead = (
         "Patterns in the errors, strongest first. The share explained is tried on data that did not make the "
         "pattern; it says where the model fails, not yet why."

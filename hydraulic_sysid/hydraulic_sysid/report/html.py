@@ -53,7 +53,12 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]], css: str = "") -> 
 
 
 def choice(label: str, options: list[tuple[str, str]]) -> str:
-    """A row of buttons of which one is on, and one panel for each: ``options`` are (title, HTML)."""
+    """A row of buttons of which one is on, and one panel for each: ``options`` are (title, HTML).
+
+    A single option needs no button.
+    """
+    if len(options) == 1:
+        return options[0][1]
     buttons = "".join(
         tag("button", text(title), type="button", role="tab", aria_selected="true" if i == 0 else "false")
         for i, (title, _) in enumerate(options)

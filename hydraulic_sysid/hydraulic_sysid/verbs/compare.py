@@ -124,7 +124,7 @@ def _print(result: dict[str, Any], console: Console) -> None:
     table.add_row("noise", *(quantity(result["summary"][n]["noise"], result["channels"][n]["unit"]) for n in channels))
     console.print(table)
     console.print(result["verdict"]["text"])
-    for finding in [f for f in result["findings"] if f["kind"] == "depends_on"][:_LISTED]:
+    for finding in [f for f in result["findings"] if f["kind"] in ("bias", "depends_on")][:_LISTED]:
         if finding["text"] not in result["verdict"]["text"]:
             console.print(f"• {finding['text']}")
 
