@@ -151,12 +151,17 @@ class Writer:
             test = " or ".join(f"on[{i}] != 0" for i in indices) or "False"
             lines.append(f"any_{name} = {test}")
         dry = [
-            e.name
+            f"(on[{self.layout.effects[e.name]}] != 0 and ({self._acts(e)}))"
             for e in self.layout.library.values()
             if any("direction" in arguments(f) for f in e.functions().values())
         ]
-        lines.append("any_direction = " + (" or ".join(f"on[{self.layout.effects[n]}] != 0" for n in dry) or "False"))
+        lines.append("any_direction = " + (" or ".join(dry) or "False"))
         return "\n".join(lines)
+
+    def _acts(self, effect: Effect) -> str:
+        """The test that an effect is not at its null value."""
+        keyed = ((self.parameter(f"{effect.name}.{p.name}"), p.null) for p in effect.parameters)
+        return " or ".join(f"{value} != {null!r}" for value, null in keyed if null is not None) or "True"
 
     def constants(self) -> str:
         p = self.parameter

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,10 +12,15 @@ from . import base, rates
 from .compiled import compiled
 from .errors import SimulationError
 from .model import Model
-from .trajectory import Array, PlantState, PlantValues, Trajectory
+from .trajectory import Array, PlantState, Trajectory
+
+if TYPE_CHECKING:
+    from .live import LivePlant
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
+FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
+MOST_HALVINGS = 6
 
 
 class Plant:
@@ -229,56 +235,40 @@ class Plant:
         Relative to the output's range over the record. Above about 1e-3 the step is too long for this model.
         """
         coarse = self.simulate(drive, dt, initial)
-        fine = object.__new__(Plant)
-        fine.__dict__.update(self.__dict__)
-        fine.longest_step = 0.5 * self.longest_step
-        other = fine.simulate(drive, dt, initial)
+        other = self._with_step(0.5 * min(self.longest_step, dt)).simulate(drive, dt, initial)
         return {
             name: float(np.max(np.abs(coarse[name] - other[name])) / max(float(np.ptp(other[name])), 1e-30))
             for name in ("position", "velocity", "pressure_a", "pressure_b")
         }
 
+    def following(
+        self, drive: ArrayLike, dt: float, initial: PlantState | None = None, tolerance: float = FOLLOWED
+    ) -> Plant:
+        """This plant, its step halved until halving it once more changes no output by more than ``tolerance``.
+
+        Raises `SimulationError` when `MOST_HALVINGS` do not suffice: the physics is too stiff for it, or chaotic
+        (a piston bouncing on its stop).
+        """
+        plant = self
+        for _ in range(MOST_HALVINGS):
+            error = plant.step_error(drive, dt, initial)
+            worst = max(error, key=lambda name: error[name])
+            if error[worst] <= tolerance:
+                return plant
+            plant = plant._with_step(0.5 * min(plant.longest_step, dt))
+        raise SimulationError(
+            f"{self.model.name}: no step down to {plant.longest_step:.1e} s follows the physics; halving it still "
+            f"changes {worst} by {error[worst]:.1e} of its range (allowed: {tolerance:g})"
+        )
+
+    def _with_step(self, longest_step: float) -> Plant:
+        other = object.__new__(Plant)
+        other.__dict__.update(self.__dict__)
+        other.longest_step = longest_step
+        return other
+
     def live(self, initial: PlantState | None = None) -> LivePlant:
         """A plant to be stepped sample by sample, as a node does."""
+        from .live import LivePlant
+
         return LivePlant(self, initial or self.initial_state())
-
-
-class LivePlant:
-    """One running plant; `step` costs a few microseconds. Not to be shared between threads."""
-
-    def __init__(self, plant: Plant, initial: PlantState) -> None:
-        self.plant = plant
-        self._state = initial.states.copy()
-        self._memory = initial.memory.copy()
-        self._time = initial.time
-        self._drive = np.zeros(1)
-        self._out = np.empty((1, len(base.OUTPUTS)))
-        self._limit = plant.value("drive_limit")
-        self._areas = plant.value("piston_area_a"), plant.value("piston_area_b")
-
-    def step(self, drive: float, dt: float) -> PlantValues:
-        """What the sensors say now, with ``drive`` [V] applied from now on; then advance by ``dt`` [s].
-
-        Raises `SimulationError` as `Plant.simulate` does.
-        """
-        applied = min(max(drive, -self._limit), self._limit)
-        self._drive[0] = applied
-        self.plant._advance(self._drive, dt, self._time, self._state, self._memory, self._out)
-        self._time += dt
-        x, v, p_a, p_b, p_s, spool = self._out[0, :6].tolist()
-        return PlantValues(x, v, p_a, p_b, p_s, spool, p_a * self._areas[0] - p_b * self._areas[1], applied)
-
-    def set_value(self, key: str, value: float) -> None:
-        """Change a parameter while running (SI); raises `ModelError` for an unknown key or a value out of bounds."""
-        self.replace_model(self.plant.model.with_values({key: value}))
-
-    def replace_model(self, model: Model) -> None:
-        """Go on with another model of the same library (effects on or off, other values) from the present state."""
-        self.plant = Plant(model)
-        self._limit = self.plant.value("drive_limit")
-        self._areas = self.plant.value("piston_area_a"), self.plant.value("piston_area_b")
-
-    @property
-    def state(self) -> PlantState:
-        """A copy of the present state."""
-        return PlantState(self._state.copy(), self._memory.copy(), self._time)

@@ -63,7 +63,11 @@ class Library(Mapping[str, Effect]):
 
     def source_file(self, name: str) -> Path:
         """The file that defines the effect."""
-        return self._found[name].path
+        return self.found(name).path
+
+    def found(self, name: str) -> Found:
+        """The effect with its file and the hash of its text. Raises `EffectError` for an unknown name."""
+        return Found(self[name], *self._found[name][1:])
 
     def parameter(self, key: str) -> Parameter:
         """The parameter behind a key: ``moving_mass`` or ``coulomb_friction.force``. Raises `EffectError`."""

@@ -16,6 +16,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.nodes._sensors import Sensor
 from hydraulic_sim.plant import Plant
+from hydraulic_sim.trial import trial_drive
 
 DEFAULT_MODEL = "moog_mcr_m_1002_bench"
 MODEL_PREFIX = "model."
@@ -57,6 +58,7 @@ class Simulator(PlantBackend):
         """Read and compile the model.
 
         :raises ModelError: the model file is not acceptable.
+        :raises SimulationError: no integration step follows its physics.
         :raises BackendError: the initial position lies outside the stroke.
         """
         model = load_model(values["model"])
@@ -68,9 +70,8 @@ class Simulator(PlantBackend):
             )
         self._start = values["initial_position"]
         self._switch_at = half - values["limit_margin"]
-        self._live = Plant(model).live()
-        # The first step compiles or loads the kernels, which must not happen in the first cycle.
-        self._live.step(0.0, 1e-3)
+        # Compiles or loads the kernels too, which must not happen in the first cycle.
+        self._live = Plant(model).following(trial_drive(model, values["rate"]), 1.0 / values["rate"]).live()
         seeds = np.random.SeedSequence(values["noise_seed"]).spawn(5)
         self._position, self._velocity, *self._pressures = (Sensor(seed) for seed in seeds)
         for spec in SENSORS:
