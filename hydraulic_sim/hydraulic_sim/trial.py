@@ -1,14 +1,57 @@
-"""A short drive on which a model's integration step is tried before anything relies on it."""
+"""Calls a new effect's kernels once in Python, so that a wrong number of results is said before anything compiles."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 
-from .model import Model
-from .trajectory import Array
+from . import base, slots
+from .effect import Effect, arguments
+from .errors import EffectError
+
+# Signals of a plant in plain motion; what can have either sign is tried with both, and at rest.
+ALWAYS_POSITIVE = {"pressure_a": 6e6, "pressure_b": 5e6, "pressure_supply": 14e6, "pressure_tank": 1e5,
+                   "volume_a": 1e-3, "volume_b": 1e-3, "viscosity": 1.0, "t": 0.5, "dt": 1e-3}  # fmt: skip
+EITHER_SIGN = {"position": 0.01, "velocity": 0.02, "load_pressure": 1e6, "flow_supply": 1e-4, "flow_tank": 1e-4,
+               "direction": 1.0}  # fmt: skip
 
 
-def trial_drive(model: Model, rate: float) -> Array:
-    """Half a second of a sweep from 1 to 40 Hz at a third of the drive, (N,) [V], sampled at ``rate`` [Hz]."""
-    t = np.arange(max(2, round(0.5 * rate))) / rate
-    return model.value("drive_limit") / 3.0 * np.sin(2.0 * np.pi * (1.0 + 39.0 * t) * t)
+def check_returns(effect: Effect, path: Path) -> None:
+    """Raise `EffectError`, naming the file, when a kernel does not return what its slot asks for."""
+    if effect.slot not in slots.SLOTS:
+        return
+    _check(effect, path, "kernel", effect.kernel, slots.SLOTS[effect.slot].returns)
+    if effect.dynamics is not None:
+        wanted = []
+        for state in effect.states:
+            wanted += [f"d({state.name})/dt"] if state.kind == "rate" else [f"rate of {state.name}", "its target"]
+        _check(effect, path, "dynamics", effect.dynamics, tuple(wanted))
+
+
+def _check(effect: Effect, path: Path, which: str, function: Callable, wanted: tuple[str, ...]) -> None:
+    values = {p.name: p.default for p in (*base.PARAMETERS, *effect.parameters)}
+    plain = getattr(function, "py_func", function)
+    expected = f"{len(wanted)}: {', '.join(wanted)}"
+    for sign in (1.0, -1.0, 0.0):
+        given = [
+            np.zeros(effect.memory) if name == "memory" else values.get(name, _signal(name, sign))
+            for name in arguments(plain)
+        ]
+        try:
+            result = plain(*given)
+        except ArithmeticError:
+            continue  # compiled, a division by zero gives an infinity, which is found when it matters
+        except Exception as error:
+            raise EffectError(f"{path}: {which} fails: {type(error).__name__}: {error}") from error
+        found = result if isinstance(result, tuple) else (result,)
+        if len(found) != len(wanted) or (len(wanted) == 1 and isinstance(result, tuple)):
+            raise EffectError(f"{path}: {which} returns {result!r}; slot {effect.slot!r} wants {expected}")
+        for value in found:
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)):
+                raise EffectError(f"{path}: {which} returns {value!r}, which is not a number; wanted {expected}")
+
+
+def _signal(name: str, sign: float) -> float:
+    return ALWAYS_POSITIVE.get(name, sign * EITHER_SIGN.get(name, 0.1))

@@ -16,7 +16,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.nodes._sensors import Sensor
 from hydraulic_sim.plant import Plant
-from hydraulic_sim.trial import trial_drive
+from hydraulic_sim.trial_drive import trial_drive
 
 DEFAULT_MODEL = "moog_mcr_m_1002_bench"
 MODEL_PREFIX = "model."
