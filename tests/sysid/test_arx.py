@@ -119,3 +119,13 @@ def test_data_that_cannot_identify_say_why(u: np.ndarray, y: np.ndarray, word: s
 def test_order_is_checked() -> None:
     with pytest.raises(IdentificationError, match="na and nb"):
         ArxOrder(0, 1, 1)
+
+
+def test_unstable_model_has_no_free_run() -> None:
+    """A record whose output grows without its input gives a model that cannot be run; that is told, not hidden."""
+    u = excite(400)
+    y = lfilter([0.0, 1.0], [1.0, -1.2], u)
+    model = fit_arx([u], [y], 0.05, ArxOrder(1, 1, 1))
+    assert not model.poles()[0].stable
+    assert np.isnan(model.simulate(u, y)).all()
+    assert np.allclose(model.predict(u, y)[-50:], y[-50:])

@@ -144,8 +144,7 @@ def _curve_shape(m: ErrorMap, unit: str, variable: str, variable_unit: str) -> t
         if odd >= 0.8 and _opposite(below, above):
             if abs(slope) >= 0.95:
                 return f"is nearly proportional to {title}: {spread}", numbers
-            sides = f"mean {quantity(above, unit)} above zero, {quantity(below, unit)} below"
-            return f"changes sign with {title}: {sides}", numbers
+            return f"changes sign with {title}: {_sides(m, unit, variable_unit)}", numbers
         if odd <= 0.2:
             return f"depends on the size of {title}, not on its sign: {spread}", numbers
     if abs(slope) >= 0.9:
@@ -163,6 +162,19 @@ def odd_share(m: ErrorMap) -> float:
     odd, even = 0.5 * (right - left), 0.5 * (right + left)
     power = float(np.sum(odd**2) + np.sum(even**2))
     return float(np.sum(odd**2)) / power if power > 0.0 else 0.0
+
+
+def _sides(m: ErrorMap, unit: str, variable_unit: str) -> str:
+    """The largest bin means on either side of zero if they are opposite, else the sides' overall means."""
+    sides = [np.flatnonzero(m.center < 0.0), np.flatnonzero(m.center > 0.0)]
+    low, high = (int(side[np.argmax(np.abs(m.mean[side]))]) for side in sides)
+    if _opposite(m.mean[low], m.mean[high]):
+        return (
+            f"mean up to {quantity(m.mean[high], unit)} near {quantity(m.center[high], variable_unit)}, "
+            f"{quantity(m.mean[low], unit)} near {quantity(m.center[low], variable_unit)}"
+        )
+    below, above = _half_means(m)
+    return f"mean {quantity(above, unit)} above zero, {quantity(below, unit)} below"
 
 
 def _opposite(one: float, other: float) -> bool:

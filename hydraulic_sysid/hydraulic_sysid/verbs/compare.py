@@ -106,7 +106,7 @@ def _print(result: dict[str, Any], console: Console) -> None:
     table = Table(
         title=f"{result['model']['name']}: RMS error {horizon} (× that of an exact model)", title_justify="left"
     )
-    table.add_column("record")
+    table.add_column("record", no_wrap=True)
     for name in channels:
         table.add_column(first_upper(result["channels"][name]["title"]), justify="right")
 

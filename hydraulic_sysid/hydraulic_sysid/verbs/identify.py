@@ -8,6 +8,7 @@ into a folder.
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from typing import Any
 
@@ -80,23 +81,34 @@ def _identify(options: argparse.Namespace) -> int:
 def _print(result: dict[str, Any], console: Console) -> None:
     own = result["settings"]["output"]["unit"]
     factor, unit = SHOWN.get(own, (1.0, own))
-    table = Table(title=result["verdict"]["text"], title_justify="left")
+    table = Table()
     for title in ("record", "data", "samples", "best fit, free run", "best fit, one step", f"MSE, one step [{unit}²]"):
-        table.add_column(title, justify="left" if title in ("record", "data") else "right")
+        left = title in ("record", "data")
+        table.add_column(title, justify="left" if left else "right", no_wrap=left)
     for part, word in (("validation", "held out"), ("estimation", "fitted")):
         for r in result[part]["records"]:
             table.add_row(
-                r["name"], word, str(r["samples"]), f"{r['best_fit_free_run']:.2f} %",
-                f"{r['best_fit_one_step']:.2f} %", number(r["mse_one_step"] * factor**2),
+                r["name"], word, str(r["samples"]), _fit(r["best_fit_free_run"]), _fit(r["best_fit_one_step"]),
+                number(r["mse_one_step"] * factor**2),
             )  # fmt: skip
         table.add_section()
     console.print(table)
+    console.print(result["verdict"]["text"])
     console.print(
         f"final prediction error {number(result['validation']['fpe'] * factor**2)} {unit}² "
         "(what is expected on fresh data)"
     )
-    poles = ", ".join(f"{complex(p['real'], p['imaginary']):.4f}" for p in result["model"]["poles"])
+    poles = ", ".join(_pole(p) for p in result["model"]["poles"])
     console.print(f"poles {poles}")
+
+
+def _fit(value: float) -> str:
+    """A best fit in percent; a dash where an unstable model has none."""
+    return "–" if math.isnan(value) else f"{value:.2f} %".replace("-", "−")
+
+
+def _pole(pole: dict[str, Any]) -> str:
+    return f"{pole['real']:.4f}" + (f"{pole['imaginary']:+.4f}i" if pole["imaginary"] else "")
 
 
 if __name__ == "__main__":
