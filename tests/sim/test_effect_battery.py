@@ -354,8 +354,6 @@ def test_the_stated_experiment_shows_the_effect(effect: Effect, bare: Model) -> 
         one = without.simulate(drive, DT, without.initial_state(position=start, drive=float(drive[0])))
         two = changed.simulate(drive, DT, changed.initial_state(position=start, drive=float(drive[0])))
         floor = {"position": 1e-5, "velocity": 1e-4, "spool": 1e-6, "opening": 1e-6}
-        shown[name] = max(
-            float(np.max(np.abs(one[c] - two[c])) / max(np.ptp(one[c]), floor.get(c, 1e4))) for c in SEEN
-        )
+        shown[name] = max(float(np.max(np.abs(one[c] - two[c])) / max(np.ptp(one[c]), floor.get(c, 1e4))) for c in SEEN)
     assert shown, f"no experiment is known for {effect.excited_by!r}"
     assert max(shown.values()) > 1e-4, shown
