@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 
 WATCH_PERIOD_S = 0.05
@@ -69,10 +70,11 @@ def serve(
             node.watch()
     finally:
         node.close()
-        executor.remove_node(node)
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown()
+        with exit_guard(node.exit_code):
+            executor.remove_node(node)
+            executor.shutdown()
+            node.destroy_node()
+            rclpy.try_shutdown()
     return node.exit_code
 
 

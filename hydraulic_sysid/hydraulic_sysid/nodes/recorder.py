@@ -25,6 +25,7 @@ from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 
 from hydraulic_interfaces.contract import NAMESPACE, RECORDER_NODE
+from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.nodes.parameters import ParameterTable
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.qos import profile
@@ -138,10 +139,11 @@ def main(argv: list[str] | None = None) -> int:
         executor.spin_once(timeout_sec=_POLL_S)
         node.poll()
     node.close("signal")
-    executor.shutdown()
-    node.destroy_node()
-    rclpy.try_shutdown()
-    return 1 if node.state == "failed" else 0
+    with exit_guard(code := int(node.state == "failed")):
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return code
 
 
 if __name__ == "__main__":

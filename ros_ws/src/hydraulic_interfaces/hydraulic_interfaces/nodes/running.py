@@ -18,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from hydraulic_interfaces.nodes.discovery import stay_local
+from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.nodes.plant_node import PARAMETERS, PlantNode
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.plant_backend import PlantBackend
@@ -59,9 +60,10 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
         os._exit(0)
     if node.state != "finalized":
         node.trigger_shutdown()
-    executor.shutdown()
-    node.destroy_node()
-    rclpy.try_shutdown()
+    with exit_guard(0):
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown()
     return 0
 
 
