@@ -18,6 +18,7 @@ from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid import cli, results
 from hydraulic_sysid.compare import ComparisonError, Settings, compare
+from hydraulic_sysid.compare.findings import AT_FLOOR
 from hydraulic_sysid.display import first_upper, number, quantity
 from hydraulic_sysid.records import Record, read_all
 
@@ -88,7 +89,7 @@ def _compare(options: argparse.Namespace) -> int:
     if options.json:
         print(summary_json(result, ("traces", "drive", "error_maps", "spectra", "error_growth")))
     else:
-        _print(result, Console(file=sys.stdout, highlight=False))
+        _print(result, Console(file=sys.stdout, highlight=False, markup=False))
         print(f"\n{page}")
     return cli.OK
 
@@ -101,7 +102,7 @@ def _write(options: argparse.Namespace, result: dict[str, Any]) -> str:
 
 
 def _print(result: dict[str, Any], console: Console) -> None:
-    channels = list(result["channels"])
+    channels = _telling(result)
     horizon = f"{result['settings']['horizon']:g} s ahead"
     table = Table(
         title=f"{result['model']['name']}: RMS error {horizon} (× that of an exact model)", title_justify="left"
@@ -127,6 +128,14 @@ def _print(result: dict[str, Any], console: Console) -> None:
     for finding in [f for f in result["findings"] if f["kind"] in ("bias", "depends_on")][:_LISTED]:
         if finding["text"] not in result["verdict"]["text"]:
             console.print(f"• {finding['text']}")
+
+
+def _telling(result: dict[str, Any]) -> list[str]:
+    """Channels for a terminal's width: the load pressure stands for both chambers, what is always met is left out."""
+    summary = result["summary"]
+    hidden = {"pressure_a", "pressure_b"} if "load_pressure" in summary else set()
+    hidden |= {n for n in ("pressure_supply", "spool") if n in summary and summary[n]["horizon"]["ratio"] <= AT_FLOOR}
+    return [name for name in result["channels"] if name not in hidden]
 
 
 def _ratio(figures: dict[str, Any]) -> str:

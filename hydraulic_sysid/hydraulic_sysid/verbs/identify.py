@@ -73,7 +73,7 @@ def _identify(options: argparse.Namespace) -> int:
     if options.json:
         print(summary_json(result, ("traces",)))
     else:
-        _print(result, Console(file=sys.stdout, highlight=False))
+        _print(result, Console(file=sys.stdout, highlight=False, markup=False))
         print(f"\n{page}")
     return cli.OK
 
@@ -82,7 +82,7 @@ def _print(result: dict[str, Any], console: Console) -> None:
     own = result["settings"]["output"]["unit"]
     factor, unit = SHOWN.get(own, (1.0, own))
     table = Table()
-    for title in ("record", "data", "samples", "best fit, free run", "best fit, one step", f"MSE, one step [{unit}²]"):
+    for title in ("record", "data", "samples", "best fit, free run", "best fit, one step", f"MSE, one step, {unit}²"):
         left = title in ("record", "data")
         table.add_column(title, justify="left" if left else "right", no_wrap=left)
     for part, word in (("validation", "held out"), ("estimation", "fitted")):
