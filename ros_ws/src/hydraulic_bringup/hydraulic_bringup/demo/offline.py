@@ -9,11 +9,14 @@ from typing import Any
 from hydraulic_sim.model import Model
 from hydraulic_sysid import arx, identification, results
 from hydraulic_sysid.compare import ComparisonError, Settings, compare
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.records import Record, RecordError, TimeError, read_records
 from hydraulic_sysid.report import write_page
 
 from .errors import DemoError
 from .online import Steps
+
+MOST_MISSING = 0.01
+"""Share of a bag's samples that the demo interpolates without giving up."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,32 @@ class Analysis:
     compared: dict[str, Any]
     page: Path
     left_out: str = ""
+
+
+def read_bag(bag: Path, steps: Steps) -> list[Record]:
+    """Records of a bag that was just made.
+
+    Samples are missing where the machine held the plant or the recorder up. A few are interpolated, and the user is
+    told; a record of the user's own is not treated so, since there a gap may mean something.
+
+    :raises DemoError: more than `MOST_MISSING` of the samples are missing, or the bag is no record.
+    """
+    try:
+        return read_records(bag)
+    except TimeError as error:
+        problem = error.problem
+    except RecordError as error:
+        raise DemoError("read the bag", str(error)) from None
+    try:
+        even, pieces = read_records(bag, "resample"), read_records(bag, "split")
+    except RecordError as error:
+        raise DemoError("read the bag", str(error)) from None
+    missing = sum(map(len, even)) - sum(map(len, pieces))
+    share = f"{missing} of {sum(map(len, even))} samples of {bag.name} are missing"
+    if missing > MOST_MISSING * sum(map(len, even)):
+        raise DemoError("read the bag", f"{share} (first: {problem})", "is the machine busy? Try again, or --quick")
+    steps.say(f"{share}: interpolated")
+    return even
 
 
 def analyse(records: list[Record], held_out: list[Record], model: Model, out: Path, steps: Steps) -> Analysis:

@@ -8,8 +8,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from .errors import DemoError
@@ -35,7 +36,7 @@ class Child:
 
     def __init__(self, name: str, module: str, arguments: Sequence[str], log: Path, env: Mapping[str, str]) -> None:
         self.name, self.log = name, log
-        self.may_end = False  # whether exit code 0 is in order before it is stopped
+        self.may_end: tuple[int, ...] = ()  # exit codes that are in order before it is stopped
         with log.open("wb") as sink:
             self._popen = subprocess.Popen(
                 [sys.executable, "-m", module, *arguments],
@@ -56,6 +57,16 @@ class Child:
     def exit_code(self) -> int | None:
         """None while it runs."""
         return self._popen.poll()
+
+    def ending(self) -> str:
+        """How it ended, in words."""
+        code = self.exit_code
+        if code is None:
+            return "it still runs"
+        if code < 0:
+            with contextlib.suppress(ValueError):
+                return f"it was killed by {signal.Signals(-code).name}"
+        return f"it ended with exit code {code}"
 
     def tail(self) -> str:
         """The last lines of its log."""
@@ -83,6 +94,20 @@ class Child:
                 return
 
 
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Puts off Ctrl-C and SIGTERM: a second one must not leave children behind that the first has not ended yet."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 class Crew:
     """All children of a run; leaving the ``with`` block stops every one, in reverse order."""
 
@@ -95,8 +120,9 @@ class Crew:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for child in reversed(self._children):
-            child.stop()
+        with _uninterrupted():
+            for child in reversed(self._children):
+                child.stop()
 
     def start(self, name: str, module: str, *arguments: str) -> Child:
         """Start ``python -m module arguments``."""
@@ -104,14 +130,13 @@ class Crew:
         self._children.append(child)
         return child
 
-    def check(self) -> None:
+    def check(self, step: str) -> None:
         """Raise `DemoError` when a child has ended that should run, or has ended badly."""
         for child in self._children:
             code = child.exit_code
-            if code is not None and not (code == 0 and child.may_end):
-                raise DemoError(
-                    child.name, f"it ended with exit code {code}; its last words:\n{child.tail()}", f"log: {child.log}"
-                )
+            if code is not None and code not in child.may_end:
+                why = f"process {child.name}: {child.ending()}; its last words:\n{child.tail()}"
+                raise DemoError(step, why, f"log: {child.log}")
 
     def wait(
         self,
@@ -123,7 +148,7 @@ class Crew:
         """Until ``condition`` is true. Raises `DemoError` when a child fails meanwhile, or it takes too long."""
         deadline = time.monotonic() + patience
         while not condition():
-            self.check()
+            self.check(step)
             if time.monotonic() > deadline:
                 heads = "\n".join(f"{c.name}:\n{c.tail()}" for c in self._children if c.exit_code is None)
                 raise DemoError(step, f"waited {patience:g} s in vain\n{heads}", f"logs: {self._logs}")

@@ -1,10 +1,11 @@
-"""A small node that drives the graph from outside: lifecycle, services, and what the recorder says."""
+"""A small node that drives the graph from outside: lifecycle, services, what recorder and excitation say."""
 
 from __future__ import annotations
 
 import json
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
@@ -14,8 +15,10 @@ from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service
+from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service, topic
 from hydraulic_interfaces.qos import profile
+
+_POLL_S = 0.1
 
 
 class GraphClient:
@@ -29,6 +32,8 @@ class GraphClient:
         self._executor.add_node(self._node)
         self._status: dict[str, Any] = {}
         self._node.create_subscription(String, f"{absolute(RECORDER_NODE)}/status", self._on_status, profile("latched"))
+        self._events: list[dict[str, Any]] = []
+        self._node.create_subscription(String, topic("experiment"), self._on_experiment, profile("experiment"))
         self._leaving = False
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
@@ -50,15 +55,25 @@ class GraphClient:
         status = json.loads(message.data)
         self._status[status["output"]] = status
 
+    def _on_experiment(self, message: String) -> None:
+        self._events.append(json.loads(message.data))
+
+    def events(self, since_ns: int) -> list[dict[str, Any]]:
+        """Events of the experiments that began after a time [ns], in their order."""
+        return [event for event in list(self._events) if event["started_ns"] >= since_ns]
+
     def recorder_status(self, folder: str) -> dict[str, Any]:
         """What the recorder has said last about a bag; empty before."""
         return dict(self._status.get(folder, {}))
 
-    def change_state(self, label: str, patience: float) -> bool:
-        """Take the plant through a transition ("configure", "activate", …); whether it did it."""
+    def change_state(self, label: str, patience: float, meanwhile: Callable[[], None] = lambda: None) -> bool:
+        """Take the plant through a transition ("configure", "activate", …); whether it did it.
+
+        ``meanwhile`` is called while there is no answer yet; what it raises ends the waiting.
+        """
         request = ChangeState.Request()
         request.transition = Transition(id=getattr(Transition, f"TRANSITION_{label.upper()}"))
-        answer = self._call(ChangeState, f"{absolute(PLANT_NODE)}/change_state", request, patience)
+        answer = self._call(ChangeState, f"{absolute(PLANT_NODE)}/change_state", request, patience, meanwhile)
         return answer is not None and bool(answer.success)
 
     def enable(self, patience: float) -> str:
@@ -68,16 +83,21 @@ class GraphClient:
             return f"no answer within {patience:g} s"
         return "" if answer.success else str(answer.message)
 
-    def _call(self, kind: Any, name: str, request: Any, patience: float) -> Any:
+    def _call(
+        self, kind: Any, name: str, request: Any, patience: float, meanwhile: Callable[[], None] = lambda: None
+    ) -> Any:
         client = self._node.create_client(kind, name)
         self._executor.wake()
         deadline = time.monotonic() + patience
         try:
-            if not client.wait_for_service(timeout_sec=patience):
-                return None
+            while not client.wait_for_service(timeout_sec=_POLL_S):
+                meanwhile()
+                if time.monotonic() > deadline:
+                    return None
             future = client.call_async(request)
             self._executor.wake()
             while not future.done() and time.monotonic() < deadline:
+                meanwhile()
                 time.sleep(0.01)
             return future.result() if future.done() else None
         finally:

@@ -66,10 +66,14 @@ class ProgressSteps:
         self._bar.update(self._task, completed=self._before)
         self._console.print(f"  {self._text:36} {time.monotonic() - self._begun:5.1f} s", highlight=False)
 
+    def say(self, text: str) -> None:
+        """Something that the user should know."""
+        self._console.print(f"  {text}", markup=False)
+
 
 def main(argv: list[str] | None = None) -> int:
     """Run the demo; 0 done, 1 a step failed, 2 bad options or input, 130 interrupted."""
-    options = _parser().parse_args(argv)
+    options = _options(argv)
     console = Console(highlight=False)
     signal.signal(signal.SIGTERM, _interrupt)
     try:
@@ -91,6 +95,18 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
+def _options(argv: list[str] | None) -> argparse.Namespace:
+    """The command line; ends the program with exit code 2 where options contradict each other."""
+    parser = _parser()
+    options = parser.parse_args(argv)
+    if options.columns and not options.record:
+        parser.error("--columns: goes with --record only")
+    if options.record and (options.quick or options.plant):
+        parser.error("--record: nothing is excited then, so --plant and --quick do not go with it")
+    options.plant = options.plant or "sim"
+    return options
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="demo", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -102,7 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--model", metavar="FILE", default=DATA_SHEET, help=f"model file or preset (default {DATA_SHEET})"
     )
-    parser.add_argument("--plant", choices=tuple(online.PLANTS), default="sim", help="what is excited (default sim)")
+    parser.add_argument("--plant", choices=tuple(online.PLANTS), help="what is excited (default sim)")
     parser.add_argument("--out", metavar="DIR", type=Path, help="new folder of the run (default runs/<date>-demo)")
     parser.add_argument("--quick", action="store_true", help="experiments of a few seconds")
     return parser
@@ -115,7 +131,7 @@ def _run(options: argparse.Namespace, console: Console) -> int:
     out = _folder(options.out)
     begun = time.monotonic()
     if options.record:
-        console.print(f"comparing {model.name} with {len(records)} record(s); results in {out}")
+        console.print(f"comparing {model.name} with {len(records)} record(s); results in {out}", soft_wrap=True)
         with ProgressSteps(console, _OFFLINE_S) as steps:
             analysis = offline.analyse(records, [], model, out, steps)
     else:
@@ -126,10 +142,12 @@ def _run(options: argparse.Namespace, console: Console) -> int:
             for name in ("chirp", "multisine")
         ]
         as_built = Path(str(files / "models" / "as_built.yaml"))
-        console.print(f"exciting a simulated actuator, comparing it with {model.name}; results in {out}")
+        console.print(
+            f"exciting a simulated actuator, comparing it with {model.name}; results in {out}", soft_wrap=True
+        )
         with ProgressSteps(console, 70.0 if kind == "full" else 35.0) as steps:
             bags = online.run(options.plant, as_built, experiments, out, steps)
-            records, held_out = (read_all([bag]) for bag in bags)
+            records, held_out = (offline.read_bag(bag, steps) for bag in bags)
             analysis = offline.analyse(records, held_out, model, out, steps)
     _print(analysis, console)
     console.print(f"\n{time.monotonic() - begun:.0f} s. Open the report: [bold]{analysis.page}[/bold]", soft_wrap=True)
