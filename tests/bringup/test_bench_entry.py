@@ -410,8 +410,16 @@ def waiting(checkout: FakeCheckout) -> Iterator[Callable[[], subprocess.Popen[st
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupt_ends_it_cleanly(waiting: Callable[[], subprocess.Popen[str]], number: signal.Signals) -> None:
-    process = waiting()
+@pytest.mark.parametrize("inherited", [signal.SIG_DFL, signal.SIG_IGN])
+def test_interrupt_ends_it_cleanly(
+    waiting: Callable[[], subprocess.Popen[str]], number: signal.Signals, inherited: signal.Handlers
+) -> None:
+    """Also as a background job of a script, which starts with SIGINT ignored."""
+    before = signal.signal(signal.SIGINT, inherited)
+    try:
+        process = waiting()
+    finally:
+        signal.signal(signal.SIGINT, before)
     process.send_signal(number)
     _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130

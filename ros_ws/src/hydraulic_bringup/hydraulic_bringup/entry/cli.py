@@ -48,7 +48,8 @@ def help_text() -> str:
 
 def main(arguments: list[str]) -> int:
     """Run one call of `./bench`; returns its exit code."""
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):  # SIGINT too: a job in the background of a script ignores it,
+        signal.signal(number, _interrupt)  # and all that is started here would inherit that
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # an old terminal's encoding is no reason to fail
