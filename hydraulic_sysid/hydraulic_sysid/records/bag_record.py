@@ -23,6 +23,9 @@ PRESSURES = ("pressure_a", "pressure_b", "pressure_supply")
 HELD = {"command": (SERVOVALVE, "effort"), "reference": (PISTON, "position")}
 """Topics that are not sampled with the state: joint and field that become the channel of that name."""
 
+_TOLD_ELSEWHERE = ("experiment", "experiment_end")
+"""Texts kept with the bag that only repeat what its messages say."""
+
 Stamps = NDArray[np.int64]
 Array = NDArray[np.float64]
 
@@ -41,14 +44,14 @@ def read_bag(path: Path, irregular: str = "error") -> list[Record]:
     bag = reader.read(path, [topic(name) for name in names])
     notes: list[str] = []
     stamps, channels = _sampled(bag, notes)
-    for name in HELD:
-        _hold(bag, name, stamps, channels, notes)
+    early = {name: _hold(bag, name, stamps, channels) for name in HELD}
     channels = _measured(path, stamps, channels)
     ordered = {name: channels[name] for name in ("command", "drive", *channels) if name in channels}
     drive_from_command(ordered, notes)
     records = []
     for span in spans(bag, stamps):
-        records += _records(path, irregular, span, stamps, ordered, notes, bag.custom)
+        lacking = [_note(name, count - span.first) for name, count in early.items() if count > span.first]
+        records += _records(path, irregular, span, stamps, ordered, [*notes, *lacking], bag.custom)
     return records
 
 
@@ -74,7 +77,7 @@ def _records(
     if span.experiment:
         description["experiment"] = span.experiment
     if custom:
-        description["bag"] = {key: _plain(value) for key, value in custom.items() if key != "experiment"}
+        description["bag"] = {key: _plain(value) for key, value in custom.items() if key not in _TOLD_ELSEWHERE}
     name = path.name.removesuffix(SUFFIX)
     title = f"{name}.{span.name}" if span.name else name
     return evenly_sampled(samples, irregular, title, [*notes, *span.notes], description)
@@ -116,11 +119,11 @@ def _sampled(bag: Bag, notes: list[str]) -> tuple[Stamps, dict[str, Array]]:
     return common, {name: values[np.searchsorted(own, common)] for name, (own, values) in columns.items()}
 
 
-def _hold(bag: Bag, name: str, stamps: Stamps, channels: dict[str, Array], notes: list[str]) -> None:
-    """Latest value at or before every stamp of a topic with stamps of its own."""
+def _hold(bag: Bag, name: str, stamps: Stamps, channels: dict[str, Array]) -> int:
+    """Latest value at or before every stamp of a topic with stamps of its own; how many stamps have none."""
     stream = bag.streams.get(topic(name))
     if stream is None or not stream.payloads:
-        return
+        return 0
     messages = _decoded(bag, name)
     joint, path = HELD[name]
     values = _values(bag, name, messages, path, _joint(bag, name, messages, joint))
@@ -130,14 +133,16 @@ def _hold(bag: Bag, name: str, stamps: Stamps, channels: dict[str, Array], notes
     index = np.searchsorted(own, stamps, side="right") - 1
     early = int((index < 0).sum())
     if early == stamps.size:
-        return
-    held = values[np.maximum(index, 0)]
-    if early and name == "command":
-        held[:early] = 0.0
-        notes.append(f"command: none before the first {early} samples; 0 V there, as the plant applies")
-    elif early:
-        notes.append(f"{name}: none before the first {early} samples; its first value there")
-    channels[name] = held
+        return 0
+    channels[name] = values[np.maximum(index, 0)]
+    if name == "command":
+        channels[name][:early] = 0.0
+    return early
+
+
+def _note(name: str, early: int) -> str:
+    what = "0 V there, as the plant applies" if name == "command" else "its first value there"
+    return f"{name}: none before the first {early} samples; {what}"
 
 
 def _measured(path: Path, stamps: Stamps, channels: Mapping[str, Array]) -> dict[str, Array]:

@@ -69,7 +69,8 @@ def _span(begin: dict[str, Any], following: Sequence[dict[str, Any]], stamps: ND
     if end is None or end.get("event") == STARTED:
         notes.append("experiment: the bag does not hold its end")
     else:
-        experiment.update(event=end["event"], reason=end.get("reason", ""), end_stamp_ns=until)
+        experiment.update({key: value for key, value in end.items() if key not in ("plan", "stamp_ns")})
+        experiment["end_stamp_ns"] = until
         if end["event"] != "finished":
             notes.append(f"experiment: {end['event']} ({end.get('reason') or 'no reason given'})")
     first, last = np.searchsorted(stamps, [begin["stamp_ns"], until], side="left")

@@ -1,0 +1,61 @@
+"""A column map that means nothing, or does not fit its file, is named with key and what is allowed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hydraulic_sysid.records import ColumnMapError, RecordError, load_column_map, parse_column_map, read_records
+
+BASE: dict[str, object] = {"time": {"dt": 0.1}, "channels": {"drive": {"column": 1, "unit": "V"}}}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"chanels": {}}, "unknown key 'chanels'"),
+        ({"channels": {"presure_a": {"column": 1, "unit": "Pa"}}}, "'presure_a' is no channel.*pressure_a"),
+        ({"channels": {"drive": {"unit": "V"}}}, "'column' is missing"),
+        ({"channels": {"drive": {"column": 0, "unit": "V"}}}, "number from 1"),
+        ({"channels": {"drive": {"column": True, "unit": "V"}}}, "number from 1"),
+        ({"channels": {"drive": {"column": 1}}}, "'unit'"),
+        ({"channels": {"drive": {"column": 1, "unit": "mm"}}}, "'mm' does not convert to V"),
+        ({"channels": {"drive": {"column": 1, "unit": "V", "sign": 2}}}, "sign is 2"),
+        ({"channels": {"drive": {"column": 1, "unit": "V", "scale": 0}}}, "scale is 0"),
+        ({"channels": {"drive": {"column": 1, "unit": "V", "scale": float("nan")}}}, "finite"),
+        ({"channels": {"drive": {"column": 1, "unit": "V", "gain": 1}}}, "unknown key 'gain'"),
+        ({"channels": {"drive": 3}}, "drive: is 3"),
+        ({"channels": {"drive": None}}, "maps no channel"),
+        ({"channels": []}, "mapping"),
+        ({"extra": {"drive": {"column": 1, "unit": "V"}}}, "'drive'"),
+        ({"extra": {"speed": {"column": 1}}}, "unit"),
+        ({"records": {}}, "both"),
+        ({"time": {}}, "'column' or 'dt'"),
+        ({"time": {"dt": 0}}, "positive"),
+        ({"time": {"dt": 0.1, "column": 1}}, "'column' or 'dt'"),
+        ({"time": {"column": 1, "unit": "m"}}, "'m' does not convert to s"),
+        ({"time": {"column": 1, "unit": "s", "irregular": "guess"}}, "error.*resample.*split"),
+        ({"delimiter": "ab"}, "delimiter"),
+    ],
+)
+def test_a_wrong_column_map_is_named(change: dict[str, object], said: str) -> None:
+    with pytest.raises(ColumnMapError, match=said):
+        parse_column_map({**BASE, **change}, "map.yaml")
+
+
+def test_a_column_map_that_does_not_fit_the_file_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text("u,y\n1,2\n3,4\n")
+    for column, said in ((3, "no column 3.*1 … 2"), ("v", "no column 'v'.*u, y")):
+        columns = parse_column_map({**BASE, "channels": {"drive": {"column": column, "unit": "V"}}})
+        with pytest.raises(RecordError, match=said):
+            read_records(file, columns)
+
+
+def test_column_map_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    (tmp_path / "bad.yaml").write_text("time: [")
+    (tmp_path / "list.yaml").write_text("- 1\n")
+    for name, said in (("bad.yaml", "not YAML"), ("list.yaml", "mapping"), ("none.yaml", "festo_hanging_load")):
+        with pytest.raises(ColumnMapError, match=said):
+            load_column_map(tmp_path / name)
