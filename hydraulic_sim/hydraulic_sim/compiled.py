@@ -77,20 +77,20 @@ def _load(library: Library) -> ModuleType:
     except OSError:
         raise
     except Exception as error:
-        raise EffectError(f"the effects do not compile: {type(error).__name__}: {error}") from error
+        raise EffectError(_blame(library, error)) from error
 
 
-def _blame(library: Library, error: NumbaError) -> str:
+def _blame(library: Library, error: Exception) -> str:
     """What does not compile, and in which effect's file: numba's complaint, short of its way through the plant."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    files = {str(library.source_file(name)) for name in library}
-    place = next((line for line in lines for file in files if file in line), "")
-    what = next((line for line in lines if not line.startswith("Failed in nopython")), "numba does not compile it")
+    lines = [line.strip() for line in f"{error}".splitlines() if line.strip()]
+    own = [str(library.source_file(name)) for name in library if not library.is_builtin(name)]
+    place = next((line for line in lines for file in own if file in line), f"(in {' or '.join(own)})" if own else "")
+    what = next((line for line in lines if not line.startswith("Failed in nopython")), type(error).__name__)
     return f"the effects do not compile: {what} {place}".strip()
 
 
 def _execute(file: Path, text: str, library: Library) -> ModuleType:
-    if not file.is_file():
+    if not file.is_file() or file.read_bytes() != text.encode():  # a power cut can leave an empty file
         _write_once(file, text)
     spec = importlib.util.spec_from_file_location(file.stem, file)
     assert spec is not None and spec.loader is not None

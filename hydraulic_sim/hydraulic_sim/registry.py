@@ -65,6 +65,10 @@ class Library(Mapping[str, Effect]):
         """The file that defines the effect."""
         return self.found(name).path
 
+    def is_builtin(self, name: str) -> bool:
+        """Whether the effect ships with the package."""
+        return str(self.source_file(name).parent) in effects.__path__
+
     def found(self, name: str) -> Found:
         """The effect with its file and the hash of its text. Raises `EffectError` for an unknown name."""
         return Found(self[name], *self._found[name][1:])
@@ -94,7 +98,7 @@ class Library(Mapping[str, Effect]):
         if key not in self._extended:
             extended = Library((*self._found.values(), *added))
             for found in added:
-                trial.check_returns(found.effect, found.path)
+                trial.check(found.effect, found.path)
             self._extended[key] = extended
         return self._extended[key]
 

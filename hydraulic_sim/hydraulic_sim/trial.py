@@ -1,4 +1,4 @@
-"""Calls a new effect's kernels once in Python, so that a wrong number of results is said before anything compiles."""
+"""Tries a new effect before anything compiles: its units, and its kernels called in Python."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 from . import base, slots
 from .effect import Effect, arguments
-from .errors import EffectError
+from .errors import EffectError, ModelError
+from .units import conversion
 
 # Signals of a plant in plain motion; what can have either sign is tried with both, and at rest.
 ALWAYS_POSITIVE = {"pressure_a": 6e6, "pressure_b": 5e6, "pressure_supply": 14e6, "pressure_tank": 1e5,
@@ -18,19 +19,23 @@ EITHER_SIGN = {"position": 0.01, "velocity": 0.02, "load_pressure": 1e6, "flow_s
                "direction": 1.0}  # fmt: skip
 
 
-def check_returns(effect: Effect, path: Path) -> None:
-    """Raise `EffectError`, naming the file, when a kernel does not return what its slot asks for."""
-    if effect.slot not in slots.SLOTS:
-        return
-    _check(effect, path, "kernel", effect.kernel, slots.SLOTS[effect.slot].returns)
+def check(effect: Effect, path: Path) -> None:
+    """Raise `EffectError`, naming the file, for an unknown unit or a kernel that does not return what its slot asks."""
+    units = {p.name: p.unit for p in effect.parameters} | {s.name: s.unit for s in effect.states}
+    for name, unit in units.items():
+        try:
+            conversion(unit, unit, name)
+        except ModelError as error:
+            raise EffectError(f"{path}: {error}") from None
+    _check_returns(effect, path, "kernel", effect.kernel, slots.SLOTS[effect.slot].returns)
     if effect.dynamics is not None:
         wanted = []
         for state in effect.states:
             wanted += [f"d({state.name})/dt"] if state.kind == "rate" else [f"rate of {state.name}", "its target"]
-        _check(effect, path, "dynamics", effect.dynamics, tuple(wanted))
+        _check_returns(effect, path, "dynamics", effect.dynamics, tuple(wanted))
 
 
-def _check(effect: Effect, path: Path, which: str, function: Callable, wanted: tuple[str, ...]) -> None:
+def _check_returns(effect: Effect, path: Path, which: str, function: Callable, wanted: tuple[str, ...]) -> None:
     values = {p.name: p.default for p in (*base.PARAMETERS, *effect.parameters)}
     plain = getattr(function, "py_func", function)
     expected = f"{len(wanted)}: {', '.join(wanted)}"
