@@ -81,7 +81,7 @@ def test_the_right_hand_side_is_finite_everywhere(
 
 
 def largest_jump(function: Callable[[float], Array], halvings: int = 46) -> float:
-    """How much ``function`` (of 0…1) still changes across the steepest of ever smaller intervals, relative to its range.
+    """How much ``function`` (of 0…1) still changes, relative to its size, across the steepest of ever smaller steps.
 
     Of a continuous function nothing is left; a jump stays.
     """

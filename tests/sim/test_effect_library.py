@@ -14,14 +14,16 @@ from hydraulic_sim.registry import library
 from hydraulic_sim.units import conversion
 
 # The names are an interface: they stand in model files and reports. This is the one place that lists them.
-VOCABULARY = """
-viscous_friction viscous_asymmetry coulomb_friction stribeck_friction friction_asymmetry position_dependent_friction
-presliding constant_load load_spring structural_flexibility end_cushion end_stop backlash internal_leakage
-turbulent_leakage external_leakage entrained_air hose_compliance viscosity_drift valve_deadband valve_underlap
-valve_null_bias valve_hysteresis valve_gain_asymmetry valve_gain_curve valve_flow_saturation spool_dynamics
-spool_rate_limit command_delay supply_droop return_back_pressure pump_ripple sensor_offset sensor_scale
-sensor_nonlinearity sensor_lag sensor_delay sensor_backlash sensor_quantisation pressure_offset
-""".split()
+VOCABULARY = (
+    "viscous_friction", "viscous_asymmetry", "coulomb_friction", "stribeck_friction", "friction_asymmetry",
+    "position_dependent_friction", "presliding", "constant_load", "load_spring", "structural_flexibility",
+    "end_cushion", "end_stop", "backlash", "internal_leakage", "turbulent_leakage", "external_leakage",
+    "entrained_air", "hose_compliance", "viscosity_drift", "valve_deadband", "valve_underlap", "valve_null_bias",
+    "valve_hysteresis", "valve_gain_asymmetry", "valve_gain_curve", "valve_flow_saturation", "spool_dynamics",
+    "spool_rate_limit", "command_delay", "supply_droop", "return_back_pressure", "pump_ripple", "sensor_offset",
+    "sensor_scale", "sensor_nonlinearity", "sensor_lag", "sensor_delay", "sensor_backlash", "sensor_quantisation",
+    "pressure_offset",
+)  # fmt: skip
 
 EVERY = pytest.mark.parametrize("effect", library().values(), ids=list(library()))
 PARAMETERS = [(e.name, p) for e in library().values() for p in e.parameters] + [("base", p) for p in base.PARAMETERS]
