@@ -233,7 +233,7 @@ def test_an_abort_is_answered_by_another_run_and_ctrl_c_by_an_end(demo: Any, wai
 
 
 def test_a_plant_that_cannot_start_is_told_at_once(demo: Any, tmp_path: Path) -> None:
-    """It dies before any of its services is there: nobody waits for them. (Of all parts only nodes need these types.)"""
+    """It dies before any of its services is there, and nobody waits for them. (Only nodes need these types.)"""
     package = tmp_path / "elsewhere" / "diagnostic_msgs"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("raise ImportError('a broken set-up')\n")
