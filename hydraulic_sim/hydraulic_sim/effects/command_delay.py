@@ -19,7 +19,7 @@ EFFECT = Effect(
     kernel=delay_command,
     memory=258,
     parameters=(
-        Parameter("delay", "s", 4e-3, (0.0, 0.05), "dead time T", "bus and amplifier cycles: 1 to 20 ms", null=0.0),
+        Parameter("delay", "s", 4e-3, (0.0, 0.2), "dead time T", "bus and amplifier cycles: 1 to 20 ms", null=0.0),
     ),
     equation="s_d(t) = u(t - T)",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",
