@@ -143,6 +143,17 @@ def test_a_damaged_chunk_is_left_out(tmp_path: Path) -> None:
     result = recover(bag)
     assert result.damaged == 1
     assert contents(bag) == EXPECTED[:16] + EXPECTED[24:]
+    assert result.missing[TEXT.name] == 8
+
+
+def test_several_publishers_leave_it_open_what_is_missing(tmp_path: Path) -> None:
+    writer = BagWriter(tmp_path / "two")
+    for k, number in enumerate([1, 2, 500, 3, 501]):
+        writer.write(TEXT, START + k, START + k, text("x"), number)
+    writer.flush()
+    writer.abandon()
+    result = recover(tmp_path / "two")
+    assert result.summary.messages == {TEXT.name: 5} and result.missing == {}
 
 
 def test_messages_whose_topic_is_lost_are_counted(tmp_path: Path) -> None:
@@ -225,7 +236,9 @@ def test_the_verb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verb.main([str(bag)]) == 0
     out = capsys.readouterr().out
     assert "recovered: 41 messages" in out and "4 bytes" in out
-    assert any(line.split() == [TEXT.name, "40", "std_msgs/msg/String"] for line in out.splitlines())
+    assert any(
+        line.split() == [TEXT.name, "40", "saved", "0", "lost", "std_msgs/msg/String"] for line in out.splitlines()
+    )
     assert verb.main([str(bag)]) == 0
     assert "nothing was changed" in capsys.readouterr().out
     assert verb.main([str(tmp_path / "none")]) == 2

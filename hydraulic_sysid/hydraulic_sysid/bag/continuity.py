@@ -23,3 +23,25 @@ class Continuity:
         if self._publishers == 1 and 0 < self._last < number - 1:
             self.missing += number - self._last - 1
         self._last = number
+
+
+class Gaps:
+    """Counts what is missing in one topic of a file, where nothing tells how many publishers it had."""
+
+    def __init__(self) -> None:
+        self._missing = 0
+        self._last: int | None = None
+        self._one_publisher = True
+
+    def take(self, number: int) -> None:
+        """A message with this number is there."""
+        if self._last is not None:
+            self._missing += number - self._last - 1
+            # Not after the one before: of another publisher, or both without a number.
+            self._one_publisher &= number > self._last
+        self._last = number
+
+    @property
+    def missing(self) -> int | None:
+        """Messages missing between the first and the last one; None where the numbers do not tell."""
+        return self._missing if self._one_publisher else None

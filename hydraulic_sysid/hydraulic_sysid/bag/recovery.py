@@ -27,6 +27,7 @@ from zstandard import ZstdError
 
 from hydraulic_interfaces.contract import topic
 from hydraulic_sysid.bag import metadata
+from hydraulic_sysid.bag.continuity import Gaps
 from hydraulic_sysid.bag.experiment import ExperimentLog
 from hydraulic_sysid.bag.metadata import BagTopic
 from hydraulic_sysid.bag.types import MessageType
@@ -49,11 +50,13 @@ class Recovery:
 
     `lost_bytes` at the end of the file belong to a record that was cut off; `damaged` counts records (mostly
     chunks) that are there but cannot be read, `orphans` messages of which the topic is not known.
-    `whole` says that the bag was in order and has been left as it was.
+    `missing` counts, by topic, what its publisher sent between the first and the last message that is there; topics
+    with several publishers are not in it. `whole` says that the bag was in order and has been left as it was.
     """
 
     summary: BagSummary
     types: dict[str, str] = field(default_factory=dict)
+    missing: dict[str, int] = field(default_factory=dict)
     lost_bytes: int = 0
     damaged: int = 0
     orphans: int = 0
@@ -155,6 +158,7 @@ def _rewrite(stream: BinaryIO, folder: Path, file_name: str) -> Recovery:
     schemas: dict[int, Schema] = {}
     topics: dict[int, BagTopic] = {}
     custom: dict[str, str] = {}
+    gaps: dict[str, Gaps] = {}
     experiment = ExperimentLog()
     experiment_topic = topic("experiment")
     writer = BagWriter(folder, file_name=file_name)
@@ -167,6 +171,7 @@ def _rewrite(stream: BinaryIO, folder: Path, file_name: str) -> Recovery:
                     continue
                 if known.name == experiment_topic:
                     experiment.take(record.data)
+                gaps.setdefault(known.name, Gaps()).take(record.sequence)
                 writer.write(known, record.log_time, record.publish_time, record.data, record.sequence)
             elif isinstance(record, Schema):
                 schemas[record.id] = record
@@ -175,6 +180,7 @@ def _rewrite(stream: BinaryIO, folder: Path, file_name: str) -> Recovery:
                 result.types[record.topic] = topics[record.id].type.name
             elif isinstance(record, Metadata) and record.name == RECORDING_METADATA:
                 custom.update(record.metadata)
+        result.missing = {name: gap.missing for name, gap in gaps.items() if gap.missing is not None}
         result.summary = writer.close({**custom, **experiment.custom_data()})
     except BaseException:
         writer.abandon()

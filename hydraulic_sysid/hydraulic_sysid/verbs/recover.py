@@ -46,6 +46,7 @@ def _as_json(result: Recovery) -> str:
         "messages": summary.messages,
         "start_ns": summary.start_ns,
         "duration_ns": summary.duration_ns,
+        "missing": result.missing,
         "lost_bytes": result.lost_bytes,
         "damaged_records": result.damaged,
         "messages_without_topic": result.orphans,
@@ -60,7 +61,7 @@ def _as_text(result: Recovery) -> str:
     lines = [f"{summary.folder}: {state}: {total} messages over {summary.duration_ns * 1e-9:.3f} s"]
     width = max(len(name) for name in summary.messages) if summary.messages else 0
     lines += [
-        f"  {name:<{width}}  {count:>9}  {result.types.get(name, '')}"
+        f"  {name:<{width}}  {count:>9} saved  {_lost(result, name)}  {result.types.get(name, '')}"
         for name, count in sorted(summary.messages.items())
     ]
     if result.lost_bytes:
@@ -70,6 +71,12 @@ def _as_text(result: Recovery) -> str:
     if result.orphans:
         lines.append(f"  left out: {result.orphans} messages whose topic is described in a damaged record")
     return "\n".join(lines)
+
+
+def _lost(result: Recovery, name: str) -> str:
+    """How many are missing between the first and the last message; blank where nothing tells."""
+    lost = result.missing.get(name)
+    return f"{lost:>7} lost" if lost is not None else " " * 12
 
 
 if __name__ == "__main__":
