@@ -37,6 +37,8 @@ BASE: dict[str, object] = {"time": {"dt": 0.1}, "channels": {"drive": {"column":
         ({"time": {"column": 1, "unit": "m"}}, "'m' does not convert to s"),
         ({"time": {"column": 1, "unit": "s", "irregular": "guess"}}, "error.*resample.*split"),
         ({"delimiter": "ab"}, "delimiter"),
+        ({"notes": None}, "notes is None, must be a text or a list of texts"),
+        ({"notes": [1]}, "must be a text or a list of texts"),
     ],
 )
 def test_a_wrong_column_map_is_named(change: dict[str, object], said: str) -> None:

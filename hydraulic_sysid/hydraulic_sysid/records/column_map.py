@@ -141,6 +141,9 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
         entry = {key: time[key] for key in ("column", "unit", "scale") if key in time}
         column = _column(entry, "time", f"{where}: time")
     notes = top.get("notes", [])
+    notes = [notes] if isinstance(notes, str) else notes
+    if not isinstance(notes, list) or not all(isinstance(note, str) for note in notes):
+        raise ColumnMapError(f"{where}: notes is {notes!r}, must be a text or a list of texts")
     return ColumnMap(
         parts,
         column,
@@ -151,7 +154,7 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
         _choice(top.get("delimiter"), f"{where}: delimiter", (",", ";", "\t", " ", None)),
         _choice(top.get("decimal"), f"{where}: decimal", (".", ",", None)),
         where,
-        tuple(str(note) for note in ([notes] if isinstance(notes, str) else notes)),
+        tuple(notes),
     )
 
 
