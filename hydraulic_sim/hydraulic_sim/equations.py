@@ -61,7 +61,7 @@ bristle_length = {bristle_length}; bristle_time = {bristle_time}
 turn = 1.0 if velocity >= 0.0 else -1.0
 R[{stick_r}] = abs(velocity) / bristle_length
 G[{stick_r}] = turn
-direction = stick + bristle_time * R[{stick_r}] * (turn - stick)
+direction = stick + min(bristle_time * R[{stick_r}], 1.0) * (turn - stick)
 force = 0.0
 {force}
 K[0] = velocity

@@ -1,9 +1,10 @@
 """Presliding: before it slides, dry friction yields like a spring of bristles.
 
-    dz/dt = |v|/δ·(sign v − z),   F_dry = F(v)·(z + τ·dz/dt)
+    dz/dt = |v|/δ·(sign v − z),   F_dry = F(v)·(z + τ·dz/dt), never beyond F(v)
 
-The bristles' stiffness is Fc/δ, their damping Fc·τ/δ (σ0 and σ1 of LuGre). All dry friction of the model turns with
-z; at its null value δ is the library's few micrometres, far below what position sensors resolve.
+The bristles' stiffness is Fc/δ, their damping Fc·τ/δ (σ0 and σ1 of LuGre), which ends where friction is fully turned:
+above δ/τ it follows the sign of the velocity. All dry friction of the model turns with z; at its null value δ is the
+library's few micrometres, far below what position sensors resolve.
 
 Source: Dahl (1968), A solid friction model; Canudas de Wit, Olsson, Åström & Lischinsky (1995),
 IEEE Trans. Automatic Control 40(3).
@@ -41,7 +42,7 @@ EFFECT = Effect(
             null=BRISTLE_TIME,
         ),
     ),
-    equation="dz/dt = |v|/d*(sign v - z); F = F_dry*(z + tau*dz/dt)",
+    equation="dz/dt = |v|/d*(sign v - z); F = F_dry*(z + tau*dz/dt), never beyond F_dry",
     source="Canudas de Wit et al. (1995), IEEE Trans. Automatic Control 40(3); Dahl (1968)",
     excited_by="small reversals within and just beyond the bristles' length",
     confused_with=("backlash", "valve_hysteresis", "coulomb_friction"),
