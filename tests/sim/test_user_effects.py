@@ -18,7 +18,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_sim.plant import Plant
 
-LEAK = '''
+LEAK = """
 from hydraulic_sim.effect import Effect, Parameter
 
 GAIN = 2.0
@@ -38,7 +38,7 @@ EFFECT = Effect(
     equation="q = c*PL", source="made up, 2001", excited_by="holding under load",
     confused_with=("internal_leakage",), told_apart_by="-",
 )
-'''
+"""
 
 PROCESS = """
 import sys
