@@ -139,6 +139,23 @@ events = st.one_of(
 )
 
 
+def test_a_stop_in_the_middle_of_enable_leaves_nothing_enabled_after_reset() -> None:
+    class Interrupted(CommandGate):
+        """Stopped by another thread just after `enable` has looked."""
+
+        @property
+        def stopped(self) -> bool:
+            before = bool(self.stop_reason)
+            self.stop("fault")
+            return before
+
+    one = Interrupted()
+    one.enable(True)
+    one.reset()
+    assert one.accept(Command(0, "test", 1.0), 0) is Verdict.DISABLED
+    assert one.drive(0) == 0.0
+
+
 @settings(max_examples=300, deadline=None)
 @given(st.lists(events, max_size=60))
 def test_no_sequence_yields_a_drive_that_is_not_allowed(sequence: list[tuple]) -> None:

@@ -86,6 +86,24 @@ def test_stamps_lie_on_the_grid_and_the_end_is_at_zero(wait_until: Any) -> None:
     assert gc.isenabled()
 
 
+def test_a_run_begins_without_the_drive_that_the_last_one_ended_with(wait_until: Any) -> None:
+    class Silent(Ports):
+        def take_commands(self, gate: CommandGate, now_ns: int) -> None:
+            return
+
+    gate, ports, backend = CommandGate(watchdog=5.0), Silent(), Scripted()
+    gate.enable(True)
+    now = time.time_ns()
+    assert gate.accept(Command(now, "test", 1.0), now).obeyed
+    loop = PlantLoop(backend, gate, ports, LoopTiming(PERIOD))
+    loop.start()
+    try:
+        wait_until(lambda: len(ports.samples) >= 5, "five samples")
+    finally:
+        assert loop.stop()
+    assert set(backend.drives) == {0.0}
+
+
 def test_a_stall_is_made_up_for_by_a_plant_that_can(wait_until: Any) -> None:
     loop, ports = run(Scripted(lambda k: time.sleep(0.02 if k == 50 else 0), 10_000), 200, wait_until)
     stamps = [s.stamp_ns for s in ports.samples]

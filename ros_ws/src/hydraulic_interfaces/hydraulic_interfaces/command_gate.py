@@ -95,7 +95,14 @@ class CommandGate:
 
     def reset(self) -> None:
         """Release the latched stop, if there is one; the gate then stays disabled until `enable`."""
+        if self.stop_reason:
+            # An `enable` at the moment of the stop may have come after it; it must not move anything now.
+            self.enabled = False
         self.stop_reason = ""
+
+    def forget(self) -> None:
+        """Begin at 0 V without a source; for the thread of `accept` and `drive`, before its first cycle."""
+        self._release()
 
     def age(self, now_ns: int) -> float:
         """Seconds since the last obeyed command arrived; NaN when no source is in command."""

@@ -143,6 +143,7 @@ class PlantLoop:
 
     def _cycle(self, wait: Callable[[int], int]) -> None:
         timing, gate, ports, monitor = self._timing, self._gate, self._ports, self.monitor
+        gate.forget()  # a drive that an earlier run was ended with
         wall_period = timing.period_ns / timing.factor
         catch_up = _OWN_CLOCK_CATCH_UP if timing.own_clock else self._backend.catch_up
         origin = time.monotonic_ns() + round(wall_period)
