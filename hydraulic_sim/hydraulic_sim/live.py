@@ -43,10 +43,11 @@ class LivePlant:
     def replace_model(self, model: Model) -> None:
         """Go on with another model of the same library (effects on or off, other values) from the present state.
 
-        Raises `ModelError` when the model brings effect files of its own that this plant does not know.
+        Raises `ModelError` when the model's effect files are not those this plant was compiled from: others, or
+        edited since. States and memories would not fit.
         """
-        if tuple(model.library) != tuple(self.plant.model.library):
-            raise ModelError(f"model {model.name!r} has other effect files than the plant that runs")
+        if model.library.fingerprint != self.plant.model.library.fingerprint:
+            raise ModelError(f"model {model.name!r} has other effect files than the plant that runs, or edited ones")
         self.plant = Plant(model, min(self.plant.longest_step, LONGEST_STEP))
         self._limit = self.plant.value("drive_limit")
         self._areas = self.plant.value("piston_area_a"), self.plant.value("piston_area_b")
