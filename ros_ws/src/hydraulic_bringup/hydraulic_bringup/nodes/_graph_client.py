@@ -16,13 +16,24 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service, topic
+from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.qos import profile
 
 _POLL_S = 0.1
 
 
+_LEFT: list[GraphClient] = []
+
+
+def take_down_left(code: int) -> None:
+    """The last thing of a program that used clients and ends with ``code``: take them out of the graph."""
+    with exit_guard(code):
+        while _LEFT:
+            _LEFT.pop().take_down()
+
+
 class GraphClient:
-    """Context manager around a node with a thread of its own."""
+    """Context manager around a node with a thread of its own. It stays in the graph until `take_down_left`."""
 
     def __enter__(self) -> GraphClient:
         self._context = rclpy.Context()
@@ -43,6 +54,10 @@ class GraphClient:
         self._leaving = True
         self._executor.wake()
         self._thread.join(2.0)
+        _LEFT.append(self)
+
+    def take_down(self) -> None:
+        """Leave the graph; the middleware may never come back from this (see `exit_guard`)."""
         self._executor.shutdown()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)

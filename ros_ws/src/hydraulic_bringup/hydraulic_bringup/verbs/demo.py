@@ -74,8 +74,16 @@ class ProgressSteps:
 def main(argv: list[str] | None = None) -> int:
     """Run the demo; 0 done, 1 a step failed, 2 bad options or input, 130 interrupted."""
     options = _options(argv)
-    console = Console(highlight=False)
     signal.signal(signal.SIGTERM, _interrupt)
+    code = _guarded(options, Console(highlight=False))
+    if not options.record:
+        from hydraulic_bringup.nodes._graph_client import take_down_left
+
+        take_down_left(code)
+    return code
+
+
+def _guarded(options: argparse.Namespace, console: Console) -> int:
     try:
         return _run(options, console)
     except DemoError as error:
