@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import gc
 import signal
 import sys
@@ -12,9 +11,8 @@ import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 
+from hydraulic_interfaces.nodes import command_line
 from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 
@@ -45,9 +43,7 @@ def serve(
     argv: list[str] | None,
 ) -> int:
     """Run the node until it is over; its exit code, or 2 for what it refuses when it is made."""
-    arguments = sys.argv if argv is None else [sys.argv[0], *argv]
-    _parser(description, parameters).parse_args(remove_ros_args(arguments)[1:])
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    command_line.start(command_line.parser(description, parameters), argv)
     try:
         node = make_node()
     except (ParameterException, ValueError) as error:
@@ -87,12 +83,3 @@ def fast_executor() -> Executor:
 
         return SingleThreadedExecutor()
     return EventsExecutor()
-
-
-def _parser(description: str, specs: Sequence[ParameterSpec]) -> argparse.ArgumentParser:
-    rows = [f"  {spec.name} = {spec.default!r} {spec.unit}: {spec.description}" for spec in specs]
-    return argparse.ArgumentParser(
-        description=description,
-        epilog="parameters (--ros-args -p name:=value):\n" + "\n".join(rows),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )

@@ -6,7 +6,6 @@ publishers of each topic, and "closed" once the bag is finished, with the number
 
 from __future__ import annotations
 
-import argparse
 import json
 import signal
 import sys
@@ -20,11 +19,10 @@ from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 
 from hydraulic_interfaces.contract import NAMESPACE, RECORDER_NODE
+from hydraulic_interfaces.nodes import command_line
 from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.nodes.parameters import ParameterTable
 from hydraulic_interfaces.parameter_spec import ParameterSpec
@@ -118,18 +116,13 @@ class Recorder(Node):
 
 def main(argv: list[str] | None = None) -> int:
     """Record until the end condition, SIGINT or SIGTERM; 0 done, 1 not everything written, 2 bad options."""
-    arguments = sys.argv if argv is None else [sys.argv[0], *argv]
-    rows = "\n".join(f"  {s.name} = {s.default!r} {s.unit}: {s.description}" for s in PARAMETERS)
-    text = f"{__doc__}\nparameters (--ros-args -p name:=value):\n{rows}"
-    layout = argparse.RawDescriptionHelpFormatter
-    argparse.ArgumentParser(description=text, formatter_class=layout).parse_args(remove_ros_args(arguments)[1:])
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    command_line.start(command_line.parser(__doc__, PARAMETERS), argv)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:
         node = Recorder()
-    except (ParameterException, ValueError) as error:
+    except (ParameterException, ValueError, OSError) as error:
         print(f"recorder: {error}", file=sys.stderr)
         rclpy.try_shutdown()
         return 2

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import signal
 import sys
 import threading
 import traceback
-from collections.abc import Sequence
 
 import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 
-from hydraulic_interfaces.nodes.discovery import stay_local
+from hydraulic_interfaces.nodes import command_line
 from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.nodes.plant_node import PARAMETERS, PlantNode
-from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.plant_backend import PlantBackend
 
 _SPIN_S = 1.0
@@ -33,10 +28,9 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     Three threads: this one waits for a signal, one serves ROS, the plant loop runs in its own. A signal leads
     through the lifecycle's shutdown while everything still works, so the last thing the plant sees is 0 V.
     """
-    arguments = sys.argv if argv is None else [sys.argv[0], *argv]
-    options = _parser(description, (*PARAMETERS, *backend.parameters())).parse_args(remove_ros_args(arguments)[1:])
-    stay_local()
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    parser = command_line.parser(description, (*PARAMETERS, *backend.parameters()))
+    parser.add_argument("--autostart", action="store_true", help="configure and activate at start")
+    options = command_line.start(parser, argv)
     overrides = [Parameter("autostart", value=True)] if options.autostart else []
     try:
         node = PlantNode(backend, parameter_overrides=overrides)
@@ -74,14 +68,3 @@ def _serve(executor: SingleThreadedExecutor, node: PlantNode, stop: threading.Ev
         except Exception:
             # A callback that fails must not take the services, and with them the emergency stop, away.
             node.get_logger().error(f"a callback failed:\n{traceback.format_exc()}")
-
-
-def _parser(description: str, specs: Sequence[ParameterSpec]) -> argparse.ArgumentParser:
-    rows = [f"  {spec.name} = {spec.default!r} {spec.unit}: {spec.description}" for spec in specs]
-    parser = argparse.ArgumentParser(
-        description=description,
-        epilog="parameters (--ros-args -p name:=value):\n" + "\n".join(rows),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--autostart", action="store_true", help="configure and activate at start")
-    return parser

@@ -1,0 +1,39 @@
+"""The command line that all nodes have: ROS arguments, and a help text that lists the parameters."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from hydraulic_interfaces.nodes.discovery import stay_local
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+
+
+def parser(description: str, parameters: Sequence[ParameterSpec]) -> argparse.ArgumentParser:
+    """A parser for what is no ROS argument; its help lists the parameters."""
+    rows = [f"  {spec.name} = {spec.default!r} {spec.unit}: {spec.description}" for spec in parameters]
+    return argparse.ArgumentParser(
+        description=description,
+        epilog="parameters (--ros-args -p name:=value):\n" + "\n".join(rows),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def start(options: argparse.ArgumentParser, argv: list[str] | None) -> argparse.Namespace:
+    """Read the command line (`argv`, or that of the process) and start rclpy, found on this machine only.
+
+    Signals are left to the caller. Leaves with exit code 2 for options that do not exist or are malformed.
+    """
+    arguments = sys.argv if argv is None else [sys.argv[0], *argv]
+    stay_local()
+    try:
+        given = options.parse_args(remove_ros_args(arguments)[1:])
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # rclpy has no common base for what it says about its arguments
+        options.error(f"ROS arguments: {' '.join(str(error).split())}")
+    return given
