@@ -10,6 +10,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hydraulic_sysid.errors import HydraulicSysidError
 from hydraulic_sysid.excitation import (
     ExcitationError,
     Plan,
@@ -176,6 +177,18 @@ def test_a_playback_counts_its_path_from_the_plan(tmp_path):
     (tmp_path / "drives" / "ramp.csv").unlink()
     with pytest.raises(PlaybackError, match=r"ramp\.csv"):
         load_plan(tmp_path / "plan.yaml")
+
+
+def test_what_a_command_line_says_of_a_bad_plan_is_one_line_of_the_user(tmp_path):
+    with pytest.raises(HydraulicSysidError):
+        load_plan(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize("frequency", ["2 rad/s", "5 kg", "nan", "two", "1,000"])
+def test_text_is_a_number_and_a_fitting_unit_or_refused(frequency):
+    """An angular frequency is no frequency: it would be off by 2π."""
+    with pytest.raises(PlanError, match="frequency_start"):
+        Chirp(1.0, frequency, 2.0, 1.0)
 
 
 def test_saving_gives_the_same_plan_and_overwrites_nothing_silently(tmp_path):

@@ -231,5 +231,6 @@ def test_playback_refuses_files_that_are_none_and_drives_that_are_too_large(tmp_
         Playback(broken)
     file = tmp_path / "drive.csv"
     file.write_text("0,6\n1,2\n")
-    with pytest.raises(PlanError, match="gain = 2.0"):
-        Playback(file, gain=2.0)
+    for gain in (2.0, -2.0):
+        with pytest.raises(PlanError, match=f"gain = {gain}"):
+            Playback(file, gain=gain)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from hydraulic_sysid.errors import HydraulicSysidError
 
-class ExcitationError(ValueError):
+
+class ExcitationError(HydraulicSysidError, ValueError):
     """Base of everything that excitation plans and runs raise."""
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
@@ -147,6 +149,13 @@ def _signal(content: Any, folder: Path | None) -> Signal:
         raise error.inside("signal") from None
 
 
+def _yaml() -> YAML:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    return yaml
+
+
 def shipped_plans() -> dict[str, Path]:
     """The plans that come with the package, by name."""
     return {file.stem: file for file in sorted(PLAN_FOLDER.glob("*.yaml"))}
@@ -161,8 +170,8 @@ def load_plan(source: str | Path) -> Plan:
     """
     file = shipped_plans().get(str(source), Path(source))
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        content = _yaml().load(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
         known = ", ".join(shipped_plans())
         raise ExcitationError(f"{file}: is not a readable plan: {error}; plans by name: {known}") from error
     if not isinstance(content, Mapping):
@@ -179,9 +188,10 @@ def save_plan(plan: Plan, file: str | Path, overwrite: bool = False) -> None:
     Raises:
         ExcitationError: the file exists, or cannot be written.
     """
-    content = yaml.safe_dump(plan.as_mapping(), sort_keys=False, allow_unicode=True)
+    content = StringIO()
+    _yaml().dump(plan.as_mapping(), content)
     try:
         with open(file, "w" if overwrite else "x", encoding="utf-8") as stream:
-            stream.write(content)
+            stream.write(content.getvalue())
     except OSError as error:
         raise ExcitationError(f"{file}: plan not written: {error.strerror}") from error

@@ -145,15 +145,12 @@ def in_unit(value: Any, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{value!r} is not a number")
     try:
-        return float(value)  # also "1e-3", which YAML 1.1 reads as text
+        return float(value)  # also the text of a number
     except ValueError:
         pass
-    import pint  # only here: loading it takes longer than everything else in a plan
+    from hydraulic_sim.units import to_si  # only here: loading it takes longer than everything else in a plan
 
-    try:
-        return float(pint.Quantity(str(value)).to(unit).magnitude)
-    except Exception as error:  # pint raises a dozen kinds, tokenizer errors among them
-        raise ValueError(f"{value!r} is not a quantity in {unit}") from error
+    return to_si(value, unit)
 
 
 def _declared(declaration: Declaration, default: Any) -> Any:

@@ -46,7 +46,7 @@ class Playback(Signal):
         if self.sha256 not in ("", digest):
             raise self.error("sha256", self.sha256, f"{digest}, which is what {self.file} has now")
         object.__setattr__(self, "sha256", digest)
-        if self.gain * np.abs(self._table[1]).max() > DRIVE_LIMIT_V:
+        if abs(self.gain) * np.abs(self._table[1]).max() > DRIVE_LIMIT_V:
             raise self.error("gain", self.gain, f"a factor that keeps the drive within ±{DRIVE_LIMIT_V:g} V")
 
     @cached_property
