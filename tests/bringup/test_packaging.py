@@ -174,6 +174,21 @@ def test_manifest_declares_the_ros_packages_that_are_imported(name: str) -> None
     assert (imported & ROS_MODULES) - {name} <= declared
 
 
+@every_package
+def test_manifest_names_the_libraries_that_are_imported(name: str) -> None:
+    """As rosdep keys, or in the comment that says what rosdep does not know."""
+    text = (PACKAGES[name] / "package.xml").read_text(encoding="utf-8")
+    keys = set(re.findall(r"<exec_depend>python3-(.+?)(?:-pip)?</exec_depend>", text))
+    comment = re.search(r"installed from pyproject.toml: (.+?)\. -->", text)
+    named = keys | set(comment[1].split(", ") if comment else ())
+    owners = packages_distributions()
+    for file in sources(name):
+        for module in imports_of(file) - sys.stdlib_module_names - set(NAMES) - ROS_MODULES:
+            candidates = {owner.lower().removeprefix("py") for owner in owners.get(module, [module])}
+            of_ros = any(owner.startswith("ros-") for owner in owners.get(module, []))
+            assert of_ros or {*candidates, module} & named, f"{file.relative_to(ROOT)}: {module} is not in package.xml"
+
+
 def test_colcon_knows_all_packages_as_ros_packages(tmp_path: Path) -> None:
     pytest.importorskip("colcon_ros")
     command = "import sys; from colcon_core.command import main; sys.exit(main())"
