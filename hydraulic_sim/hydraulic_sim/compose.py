@@ -22,7 +22,6 @@ from .effect import Effect, State, arguments
 from .equations import MODULE, RHS
 from .registry import Library
 
-SUBSTEP_SAFETY = 1.2  # substep × fastest pressure rate; RK4 is stable up to 2.78
 REVERSAL_BEND = 0.02  # sliding within one step, of the bristle length, from which a reversal is refined
 REVERSAL_STEP = 0.125  # and by how much
 MOST_SUBSTEPS = 2000  # in one sample, or per millisecond of it; beyond, the physics is called too stiff
@@ -196,7 +195,7 @@ def write_module(library: Library) -> str:
     return _fill(
         MODULE, functions=functions, n_rates=layout.n_rates, n_states=len(layout.states),
         constants1=w.constants(), switches1=w.switches(), rhs1=rhs, rhs4=rhs,
-        safety=SUBSTEP_SAFETY, bend=REVERSAL_BEND, shorter=REVERSAL_STEP, most=MOST_SUBSTEPS,
+        bend=REVERSAL_BEND, shorter=REVERSAL_STEP, most=MOST_SUBSTEPS,
         command=shared["command"], position_sensor7=shared["position_sensor"],
         pressure_sensor7=shared["pressure_sensor"],
     )  # fmt: skip

@@ -101,11 +101,12 @@ def rhs(now, S, command, on, P, hydraulic, K, R, G, AUX):
     AUX[9] = direction; AUX[10] = pressure_tank
 
 
-@njit("i8(f8[::1], f8, f8, f8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1], f8[::1])",
+@njit("i8(f8[::1], f8, f8, f8, f8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1], f8[::1])",
       cache=True, nogil=True, error_model="numpy")
-def run(drive, dt, start, max_step, on, P, hydraulic, X, M, Y, failure):
+def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
     """Integrates X over len(drive) samples; Y[k] is what is seen at sample k. Returns the samples done.
 
+    A substep is at most max_step long, and max_turn over the fastest rate of the oil through the lands.
     failure: time, substeps in the failing sample (0: not finite, else: too stiff for the step)."""
     {constants1}
     {switches1}
@@ -137,8 +138,8 @@ def run(drive, dt, start, max_step, on, P, hydraulic, X, M, Y, failure):
                 {rhs4}
                 if stage == 0:
                     wanted = max_step
-                    if pressure_rate * wanted > {safety}:
-                        wanted = {safety} / pressure_rate
+                    if pressure_rate * wanted > max_turn:
+                        wanted = max_turn / pressure_rate
                     # a reversal of dry friction bends the trajectory: cross it in short steps
                     swing = abs(K[1]) * wanted
                     if any_direction and abs(velocity) < 2.0 * swing and swing * wanted > {bend} * bristle_length:
@@ -199,9 +200,9 @@ def prime(drive, dt, start, on, P, X, M):
             {command}
 
 
-@njit("i8(f8[::1], f8, f8, i8[::1], i8, i8, f8[:, ::1], i8, u1[::1], f8[::1], u1, f8[:, :, ::1], f8[::1])",
+@njit("i8(f8[::1], f8, f8, f8, i8[::1], i8, i8, f8[:, ::1], i8, u1[::1], f8[::1], u1, f8[:, :, ::1], f8[::1])",
       cache=True, nogil=True, error_model="numpy")
-def run_many(drive, dt, max_step, starts, count, past, states, n_memory, on, P, hydraulic, Y, failure):
+def run_many(drive, dt, max_step, max_turn, starts, count, past, states, n_memory, on, P, hydraulic, Y, failure):
     """Runs ``count`` samples from each start, the memories primed over ``past`` samples. Returns the starts done."""
     X = np.empty(NX)
     M = np.zeros(n_memory)
@@ -212,7 +213,8 @@ def run_many(drive, dt, max_step, starts, count, past, states, n_memory, on, P, 
         M[:] = 0.0
         if past > 0:
             prime(drive[before:first], dt, before * dt, on, P, X, M)
-        done = run(drive[first:first + count], dt, first * dt, max_step, on, P, hydraulic, X, M, Y[i], failure)
+        ahead = drive[first:first + count]
+        done = run(ahead, dt, first * dt, max_step, max_turn, on, P, hydraulic, X, M, Y[i], failure)
         if done < count:
             return i
     return len(starts)

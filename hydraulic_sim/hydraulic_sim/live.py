@@ -48,7 +48,7 @@ class LivePlant:
         """
         if model.library.fingerprint != self.plant.model.library.fingerprint:
             raise ModelError(f"model {model.name!r} has other effect files than the plant that runs, or edited ones")
-        self.plant = Plant(model, min(self.plant.longest_step, LONGEST_STEP))
+        self.plant = Plant(model, min(self.plant.longest_step, LONGEST_STEP), self.plant.refinement)
         self._limit = self.plant.value("drive_limit")
         self._areas = self.plant.value("piston_area_a"), self.plant.value("piston_area_b")
 

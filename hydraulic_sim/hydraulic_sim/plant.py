@@ -27,10 +27,12 @@ class Plant:
     """A model composed and compiled.
 
     Building one costs about 0.1 ms once the library is compiled in this process. Simulation releases the GIL.
+    ``longest_step`` [s] is shortened where the physics is faster; ``refinement`` shortens the steps that follow the
+    oil through the lands as well (see `following`).
     Raises `ModelError` for a model that does not compose (two laws in one slot, missing base parameters).
     """
 
-    def __init__(self, model: Model, longest_step: float = LONGEST_STEP) -> None:
+    def __init__(self, model: Model, longest_step: float = LONGEST_STEP, refinement: float = 1.0) -> None:
         model.check_complete()
         self.model = model
         self._compiled = compiled(model.library)
@@ -45,6 +47,7 @@ class Plant:
         self._remembers = any(layout.library[name].slot == "command" for name in active)
         self._active = tuple(layout.library[name] for name in active)
         values = self._values()
+        self.refinement = refinement
         self.longest_step = rates.step(rates.fastest(self._active, values, model.kind), longest_step)
         self._shortest_dt = rates.shortest_sampling(self._active, values)
 
@@ -125,6 +128,7 @@ class Plant:
         if u.ndim != 1 or not np.all(np.isfinite(u)):
             raise SimulationError("the drive must be a one-dimensional array of finite volts")
         begin = initial or self.initial_state(drive=float(u[0]) if len(u) else 0.0)
+        self._check_state(begin)
         x, memory = begin.states.copy(), begin.memory.copy()
         out = np.empty((len(u), len(base.OUTPUTS)))
         self._advance(u, dt, begin.time, x, memory, out)
@@ -165,8 +169,9 @@ class Plant:
         out = np.empty((len(first), horizon + 1, len(base.OUTPUTS)))
         failure = np.zeros(2)
         past = LONGEST_MEMORY if self._remembers else 0
+        turn = rates.STEP_TIMES_LANDS * self.refinement
         done = self._compiled.run_many(
-            u, dt, self.longest_step, first, horizon + 1, past, states, self.layout.n_memory, self._on,
+            u, dt, self.longest_step, turn, first, horizon + 1, past, states, self.layout.n_memory, self._on,
             self._parameters, self._hydraulic, out, failure,
         )  # fmt: skip
         if done < len(first):
@@ -174,6 +179,17 @@ class Plant:
                 f"the run from sample {first[done]} failed at t = {failure[0]:.6g} s (not finite, or too stiff)"
             )
         return {name: out[:, :, i] for i, name in enumerate(base.OUTPUTS)}
+
+    def _check_state(self, state: PlantState) -> None:
+        """Compiled code trusts the lengths; those of another library's state differ."""
+        found, expected = (
+            (state.states.shape, state.memory.shape),
+            ((len(self.layout.states),), (self.layout.n_memory,)),
+        )
+        if found != expected:
+            raise SimulationError(
+                f"a state of the shapes {found} does not fit {self.model.name!r}; its states and memory have {expected}"
+            )
 
     def _check_dt(self, dt: float) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
@@ -186,18 +202,9 @@ class Plant:
     def _advance(self, u: Array, dt: float, start: float, x: Array, memory: Array, out: Array) -> None:
         self._check_dt(dt)
         failure = np.zeros(2)
+        turn = rates.STEP_TIMES_LANDS * self.refinement
         done = self._compiled.run(
-            u,
-            dt,
-            start,
-            self.longest_step,
-            self._on,
-            self._parameters,
-            self._hydraulic,
-            x,
-            memory,
-            out,
-            failure,
+            u, dt, start, self.longest_step, turn, self._on, self._parameters, self._hydraulic, x, memory, out, failure
         )
         if done < len(u):
             seen = ", ".join(f"{name}={value:.6g}" for name, value in zip(base.OUTPUTS, out[done], strict=True))
@@ -222,6 +229,7 @@ class Plant:
         total = len(self.layout.states)
         slope, rate, goal, seen = np.zeros(total), np.zeros(total - n), np.zeros(total - n), np.zeros(11)
         x = np.require(state, np.float64, ("C", "W"))
+        self._check_state(PlantState(x, np.zeros(self.layout.n_memory)))
         command = max(-1.0, min(1.0, drive / self.value("drive_limit")))
         self._compiled.rhs(time, x, command, self._on, self._parameters, self._hydraulic, slope, rate, goal, seen)
         slope[n:] = rate * (goal - x[n:])
@@ -232,13 +240,17 @@ class Plant:
     def step_error(self, drive: ArrayLike, dt: float, initial: PlantState | None = None) -> dict[str, float]:
         """How far the step is from following the physics: the largest change of each output when it is halved.
 
-        Relative to the output's range over the record. Above about 1e-3 the step is too long for this model.
+        Relative to the output's range over the record, or to a millionth of its usual size where it hardly changes.
+        Above about 1e-3 the step is too long for this model.
         """
         coarse = self.simulate(drive, dt, initial)
-        other = self._with_step(0.5 * min(self.longest_step, dt)).simulate(drive, dt, initial)
+        other = self._halved(dt).simulate(drive, dt, initial)
         return {
-            name: float(np.max(np.abs(coarse[name] - other[name])) / max(float(np.ptp(other[name])), 1e-30))
-            for name in ("position", "velocity", "pressure_a", "pressure_b")
+            s.name: float(
+                np.max(np.abs(coarse[s.name] - other[s.name])) / max(float(np.ptp(other[s.name])), 1e-6 * s.scale)
+            )
+            for s in base.STATES
+            if s.name in base.OUTPUTS
         }
 
     def following(
@@ -255,20 +267,24 @@ class Plant:
             worst = max(error, key=lambda name: error[name])
             if error[worst] <= tolerance:
                 return plant
-            plant = plant._with_step(0.5 * min(plant.longest_step, dt))
+            plant = plant._halved(dt)
         raise SimulationError(
             f"{self.model.name}: no step down to {plant.longest_step:.1e} s follows the physics; halving it still "
             f"changes {worst} by {error[worst]:.1e} of its range (allowed: {tolerance:g})"
         )
 
-    def _with_step(self, longest_step: float) -> Plant:
+    def _halved(self, dt: float) -> Plant:
+        """This plant with every step half as long."""
         other = object.__new__(Plant)
         other.__dict__.update(self.__dict__)
-        other.longest_step = longest_step
+        other.longest_step = 0.5 * min(self.longest_step, dt)
+        other.refinement = 0.5 * self.refinement
         return other
 
     def live(self, initial: PlantState | None = None) -> LivePlant:
         """A plant to be stepped sample by sample, as a node does."""
         from .live import LivePlant
 
-        return LivePlant(self, initial or self.initial_state())
+        begin = initial or self.initial_state()
+        self._check_state(begin)
+        return LivePlant(self, begin)

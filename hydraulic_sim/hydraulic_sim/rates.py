@@ -8,14 +8,18 @@ from collections.abc import Iterable, Mapping
 from .effect import Effect
 
 STEP_TIMES_RATE = 0.6  # how much of the fastest stated rate one step may cover; RK4 is stable up to 2.7
+STEP_TIMES_LANDS = 1.2  # and of the rate of the oil through the lands, which damps and is looked at in every step
 
 
 def fastest(effects: Iterable[Effect], values: Mapping[str, float], kind: str) -> float:
-    """The fastest rate [1/s] that the effects state for parameter ``values`` (by key), and that of the oil."""
+    """The fastest rate [1/s] that the effects state for parameter ``values`` (by key), and that of the oil.
+
+    A fit may try values beyond the bounds: the root of a negative stiffness is a rate of growth.
+    """
     rate = oil(values) if kind == "hydraulic" else 0.0
     for effect in effects:
         if effect.step_rate is not None:
-            rate = max(rate, float(effect.step_rate({**values, **_own(effect, values)})))
+            rate = max(rate, abs(effect.step_rate({**values, **_own(effect, values)})))
     return rate
 
 
@@ -37,7 +41,7 @@ def oil(p: Mapping[str, float]) -> float:
     a, b, stroke = p["piston_area_a"], p["piston_area_b"], p["stroke"]
     near_a = a**2 / p["dead_volume_a"] + b**2 / (p["dead_volume_b"] + b * stroke)
     near_b = b**2 / p["dead_volume_b"] + a**2 / (p["dead_volume_a"] + a * stroke)
-    return math.sqrt(p["bulk_modulus"] * max(near_a, near_b) / p["moving_mass"])
+    return math.sqrt(abs(p["bulk_modulus"] * max(near_a, near_b) / p["moving_mass"]))
 
 
 def _own(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
