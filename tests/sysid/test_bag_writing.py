@@ -236,6 +236,17 @@ def test_an_experiment_ends_when_the_streams_have_come_as_far() -> None:
     assert rule.reason(1, 6 * SECOND, log, 49) == "experiment aborted"  # the plant has gone
 
 
+def test_an_experiment_that_starts_before_the_bag_is_closed_gets_its_own_time_to_arrive() -> None:
+    log = ExperimentLog()
+    rule = StopRule(0.0, on_experiment_end=True)
+    for start in (1, 101):
+        log.take(event("started"))
+        assert not rule.reason(1, start * SECOND, log, 40)
+        log.take(text(json.dumps({"event": "finished", "stamp_ns": 50})))
+        assert not rule.reason(1, (start + 1) * SECOND, log, 40)
+    assert rule.reason(1, 106 * SECOND, log, 40) == "experiment finished"
+
+
 def test_continuity() -> None:
     one = Continuity()
     one.publishers_are(1)

@@ -29,6 +29,8 @@ class StopRule:
         self._started_ns = self._started_ns or clock_ns
         if self._max_ns and clock_ns - self._started_ns >= self._max_ns:
             return "max_duration"
+        if not experiment.ended:
+            self._ended_ns = 0  # none has, or another one has started since
         if self._on_experiment_end and experiment.ended:
             self._ended_ns = self._ended_ns or steady_ns
             waited = steady_ns - self._ended_ns
