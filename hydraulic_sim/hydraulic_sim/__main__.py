@@ -14,8 +14,11 @@ def main() -> int:
     names = sorted(m.name for m in pkgutil.iter_modules(verbs.__path__))
     if len(sys.argv) > 1 and sys.argv[1] in names:
         return importlib.import_module(f"{verbs.__name__}.{sys.argv[1]}").main(sys.argv[2:])
-    print(f"usage: python -m hydraulic_sim VERB …   verbs: {', '.join(names)}", file=sys.stderr)
-    return 2
+    asked = sys.argv[1:] in (["-h"], ["--help"])
+    print(
+        f"usage: python -m hydraulic_sim VERB …   verbs: {', '.join(names)}", file=sys.stdout if asked else sys.stderr
+    )
+    return 0 if asked else 2
 
 
 if __name__ == "__main__":

@@ -11,9 +11,11 @@ import importlib.util
 import os
 import platform
 import shutil
+import stat
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
@@ -40,7 +42,10 @@ class CompiledPlant:
 
 
 def cache_root() -> Path:
-    """Where compiled physics is kept: $HYDRAULIC_SIM_CACHE, or hydraulic_sim in the user's cache folder."""
+    """Where compiled physics is kept: $HYDRAULIC_SIM_CACHE, or hydraulic_sim in the user's cache folder.
+
+    Where that cannot be written to, a folder of the user's own among the temporary files.
+    """
     named = os.environ.get(CACHE_VARIABLE)
     if named:
         return Path(named)
@@ -48,9 +53,23 @@ def cache_root() -> Path:
     root = Path(home) / "hydraulic_sim"
     try:
         root.mkdir(parents=True, exist_ok=True)
-        return root if os.access(root, os.W_OK) else Path(tempfile.gettempdir()) / "hydraulic_sim"
+        return root if os.access(root, os.W_OK) else _temporary()
     except OSError:
-        return Path(tempfile.gettempdir()) / "hydraulic_sim"
+        return _temporary()
+
+
+@lru_cache(maxsize=1)
+def _temporary() -> Path:
+    # What lies there is executed: it must be nobody else's, who may have taken the name.
+    root = Path(tempfile.gettempdir()) / f"hydraulic_sim-{os.getuid()}"
+    try:
+        root.mkdir(mode=0o700, exist_ok=True)
+        found = root.lstat()
+        if found.st_uid == os.getuid() and stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o022:
+            return root
+    except OSError:
+        pass
+    return Path(tempfile.mkdtemp(prefix="hydraulic_sim-"))
 
 
 def _load(library: Library) -> ModuleType:
