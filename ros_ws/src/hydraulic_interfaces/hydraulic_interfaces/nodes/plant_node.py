@@ -117,6 +117,7 @@ class PlantNode(LifecycleNode):
             self._switch(self._table["enable_on_activate"])
         except Exception as error:
             self._complain(f"cannot activate: {error}")
+            self.gate.enable(False)
             self._backend.deactivate()
             return FAILURE
         self._loop = PlantLoop(self._backend, self.gate, self._ports, self._timing, self._last_stamp_ns)
