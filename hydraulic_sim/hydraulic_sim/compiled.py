@@ -6,6 +6,7 @@ versions of numba and Python: whatever changes the physics changes the folder.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.util
 import os
@@ -90,13 +91,21 @@ def _load(library: Library) -> ModuleType:
     except NumbaError as error:
         raise EffectError(_blame(library, error)) from error
     except Exception:  # a cache that another version or a crash left unreadable is worth one clean attempt
-        shutil.rmtree(file.parent, ignore_errors=True)
+        _set_aside(file.parent)
     try:
         return _execute(file, text, library)
     except OSError:
         raise
     except Exception as error:
         raise EffectError(_blame(library, error)) from error
+
+
+def _set_aside(folder: Path) -> None:
+    """Remove a cache folder under another name: a process that compiles into it at this moment is not disturbed."""
+    aside = folder.with_name(f".{folder.name}.{os.getpid()}")
+    with contextlib.suppress(OSError):
+        os.replace(folder, aside)
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def _blame(library: Library, error: Exception) -> str:

@@ -137,6 +137,8 @@ def _remove(node: CommentedMap, key: str, parent: CommentedMap, parent_key: str)
     earlier = keys[: keys.index(key)]
     del node[key]
     node.ca.items.pop(key, None)
+    if not node:
+        node.fa.set_flow_style()  # an empty block has no form but {}
     if behind:
         _append_comment(*(_last_leaf(node, earlier[-1]) if earlier else (parent, parent_key)), behind)
 

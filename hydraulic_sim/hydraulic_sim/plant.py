@@ -175,9 +175,9 @@ class Plant:
             self._parameters, self._hydraulic, out, failure,
         )  # fmt: skip
         if done < len(first):
-            raise SimulationError(
-                f"the run from sample {first[done]} failed at t = {failure[0]:.6g} s (not finite, or too stiff)"
-            )
+            start = int(first[done])
+            into = min(max(int((failure[0] - start * dt) / dt + 1e-6), 0), horizon)
+            raise self._failed(failure, start + into, u, out[done, into], f"the run from sample {start} failed")
         return {name: out[:, :, i] for i, name in enumerate(base.OUTPUTS)}
 
     def _check_state(self, state: PlantState) -> None:
@@ -207,17 +207,20 @@ class Plant:
             u, dt, start, self.longest_step, turn, self._on, self._parameters, self._hydraulic, x, memory, out, failure
         )
         if done < len(u):
-            seen = ", ".join(f"{name}={value:.6g}" for name, value in zip(base.OUTPUTS, out[done], strict=True))
             where = ", ".join(f"{name}={value:.6g}" for name, value in zip(self.layout.states, x, strict=True))
-            why = (
-                "a state is no longer finite"
-                if failure[1] == 0.0
-                else f"the physics is too stiff: more than {failure[1]:.0f} substeps in one sample"
-            )
-            raise SimulationError(
-                f"{why} at t = {failure[0]:.6g} s (sample {done}); drive {u[done]:.6g} V, "
-                f"before it {u[max(done - 1, 0)]:.6g} V; at the sample: {seen}; state reached: {where}"
-            )
+            raise self._failed(failure, done, u, out[done], f"state reached: {where}")
+
+    def _failed(self, failure: Array, sample: int, u: Array, outputs: Array, more: str) -> SimulationError:
+        seen = ", ".join(f"{name}={value:.6g}" for name, value in zip(base.OUTPUTS, outputs, strict=True))
+        why = (
+            "a state is no longer finite"
+            if failure[1] == 0.0
+            else f"the physics is too stiff: more than {failure[1]:.0f} substeps in one sample"
+        )
+        return SimulationError(
+            f"{why} at t = {failure[0]:.6g} s (sample {sample}); drive {u[sample]:.6g} V, "
+            f"before it {u[max(sample - 1, 0)]:.6g} V; at the sample: {seen}; {more}"
+        )
 
     def derivative(self, state: Array, drive: float, time: float = 0.0) -> tuple[Array, dict[str, float]]:
         """d(state)/dt (n_states,) for a drive [V] without the command's effects of memory, and inner signals.

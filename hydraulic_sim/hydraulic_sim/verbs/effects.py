@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 
 from rich.console import Console
@@ -29,13 +30,21 @@ def main(argv: list[str] | None = None) -> int:
     except HydraulicSimError as error:
         print(f"effects: {error}", file=sys.stderr)
         return 2
+    try:
+        _show(options, found, records)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader (head, less) has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
+
+
+def _show(options: argparse.Namespace, found: Library, records: list[dict]) -> None:
     if options.json:
         print(json.dumps(records[0] if options.name else records, indent=2, ensure_ascii=False))
     elif options.name:
         _whole(records[0])
     else:
         _overview(found)
-    return 0
 
 
 def _overview(found: Library) -> None:

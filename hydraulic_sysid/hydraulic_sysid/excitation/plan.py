@@ -18,6 +18,7 @@ from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
 from hydraulic_sysid.excitation.settings import Settings, number, section, text
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds
 from hydraulic_sysid.excitation.signals._base import Array
+from hydraulic_sysid.results import write_text
 
 PLAN_FOLDER = Path(__file__).parent / "plans"
 
@@ -168,7 +169,9 @@ def load_plan(source: str | Path) -> Plan:
         PlanError: not allowed; names file, key, value and what is allowed.
         PlaybackError: the file that a playback names is not readable.
     """
-    file = shipped_plans().get(str(source), Path(source))
+    file = Path(source)
+    if not file.is_file():
+        file = shipped_plans().get(str(source), file)
     try:
         content = _yaml().load(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, YAMLError) as error:
@@ -188,10 +191,11 @@ def save_plan(plan: Plan, file: str | Path, overwrite: bool = False) -> None:
     Raises:
         ExcitationError: the file exists, or cannot be written.
     """
+    if Path(file).exists() and not overwrite:
+        raise ExcitationError(f"{file}: plan not written: it exists")
     content = StringIO()
     _yaml().dump(plan.as_mapping(), content)
     try:
-        with open(file, "w" if overwrite else "x", encoding="utf-8") as stream:
-            stream.write(content.getvalue())
+        write_text(Path(file), content.getvalue())
     except OSError as error:
         raise ExcitationError(f"{file}: plan not written: {error.strerror}") from error
