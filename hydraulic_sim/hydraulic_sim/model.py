@@ -92,7 +92,10 @@ class Model:
         return tuple(key for key in self.keys() if self.entry(key).free)
 
     def with_values(self, values: Mapping[str, float], *, source: str | None = None) -> Model:
-        """A copy with other values [SI]. Raises `ModelError` for an unknown key or a value out of bounds."""
+        """A copy with other values [SI]. A value that changes takes ``source``, and loses the standard error.
+
+        Raises `ModelError` for an unknown key or a value out of bounds, the library's or those of the entry.
+        """
         entries = dict(self.entries)
         for key, value in values.items():
             record = self.parameter(key)
@@ -100,8 +103,14 @@ class Model:
                 number = check_value(record, value, key)
             except EffectError as error:
                 raise ModelError(f"{self._label}: {error}") from None
-            old = entries.get(key) or Entry(record.default, source=record.source)
-            entries[key] = replace(old, value=number, source=old.source if source is None else source)
+            old = entries.get(key, Entry(record.default, source=record.source))
+            try:
+                check_within(key, record, number, old.bounds)
+            except ModelError as error:
+                raise ModelError(f"{self._label}: {error}") from None
+            if number != old.value:
+                old = replace(old, value=number, source="", standard_error=None)
+            entries[key] = old if source is None else replace(old, source=source)
         return replace(self, entries=entries)
 
     def with_entry(self, key: str, **changes: object) -> Model:
@@ -181,3 +190,11 @@ def check_bounds(key: str, record: Parameter, bounds: Iterable[float]) -> tuple[
             f"{record.unit}"
         )
     return low, high
+
+
+def check_within(key: str, record: Parameter, value: float, bounds: tuple[float, float] | None) -> None:
+    """Raise `ModelError` when a value lies outside the bounds that a model file gives for it."""
+    if bounds is not None and not bounds[0] <= value <= bounds[1]:
+        raise ModelError(
+            f"{key}: {value:g} {record.unit} is outside its bounds {bounds[0]:g} … {bounds[1]:g} {record.unit}"
+        )

@@ -28,7 +28,7 @@ from ruamel.yaml.representer import RepresenterError
 
 from .effect import Parameter, check_value
 from .errors import EffectError, ModelError
-from .model import KINDS, Entry, Model, check_bounds
+from .model import KINDS, Entry, Model, check_bounds, check_within
 from .model_document import FORMAT, document, plain
 from .registry import library
 from .units import to_si
@@ -216,8 +216,7 @@ class _Reader:
             bounds = check_bounds(key, record, (to_si(b, record.unit, f"{key} bounds") for b in bounds))
         error = raw.get("standard_error")
         value = check_value(record, to_si(raw["value"], record.unit, key), key)
-        if bounds is not None and not bounds[0] <= value <= bounds[1]:
-            raise ModelError(f"{key}: {value:g} {record.unit} is outside its bounds {bounds[0]:g} … {bounds[1]:g}")
+        check_within(key, record, value, bounds)
         return Entry(
             value=value,
             source=str(raw.get("source") or ""),
