@@ -160,5 +160,5 @@ def read_folder(path: Path) -> list[dict[str, Any]]:
         except ResultError:
             continue  # a run's folder may hold other JSON
     if not found:
-        raise ResultError(f"{path} holds no result: run compare or identify with --out {path} first")
+        raise ResultError(f"{path} holds no result: run calibrate, compare or identify with --out {path} first")
     return sorted(found, key=lambda r: str(r["created"]))

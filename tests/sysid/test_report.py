@@ -174,7 +174,7 @@ def test_unknown_version_is_refused(comparison: dict[str, Any]) -> None:
 
 
 def test_folder_without_results_says_what_to_do(tmp_path: Path) -> None:
-    with pytest.raises(results.ResultError, match="run compare or identify"):
+    with pytest.raises(results.ResultError, match="run calibrate, compare or identify"):
         results.read_folder(tmp_path)
     with pytest.raises(results.ResultError, match="does not exist"):
         results.read_folder(tmp_path / "nowhere")

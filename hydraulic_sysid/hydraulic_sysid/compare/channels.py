@@ -56,7 +56,7 @@ class VelocityFilter:
         Technometrics 15 (1973) 661–675).
         """
         windows = sorted({max(5, 2 * int(round(span / dt / 2.0)) + 1) for span in SPANS})
-        windows = [w for w in windows if w <= position.size]
+        windows = [w for w in windows if 3 * w <= position.size] or windows[:1]
         filters = [cls(dt, w) for w in windows]
         shortest = filters[0]
         reference, weights = shortest(position), shortest.weights

@@ -11,13 +11,14 @@ from plotly.offline import get_plotlyjs
 
 from hydraulic_sysid.results import PAGE, PAGE_MARK, ResultError, verb_of, write_text
 
-from . import compare_section, identify_section
+from . import calibrate_section, compare_section, identify_section
 from .html import Figures, tag, text
 
 Result = dict[str, Any]
 
 # A result's schema chooses how it is shown; a new kind of result adds its section here.
 SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
+    "hydraulic_sysid.calibrate/1": calibrate_section.html,
     "hydraulic_sysid.compare/1": compare_section.html,
     "hydraulic_sysid.identify/1": identify_section.html,
 }
