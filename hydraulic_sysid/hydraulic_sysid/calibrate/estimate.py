@@ -23,7 +23,7 @@ from .steps import LEAST_DAMPING, ahead, bounded_step
 
 Array = NDArray[np.float64]
 
-_MOST_DAMPING = 1e6
+_MOST_DAMPING = 1e3
 _FLAT = 1e-6  # relative gain of a step from which on no more is expected of others
 _RESTED = 1e-4  # the same for the starts alone
 _RESTS = 4  # times that starts are moved where no parameter is fitted
@@ -164,9 +164,9 @@ def _minimise(
                 break
             shooting.starts = before
             damping *= 8.0
-        left = ahead(information, gradient, values, scales, bounds) * _count(linear) / cost
+        left = ahead(information, scores, values, scales, bounds)
         if moved is None:
-            converged = left < _UPHILL**2
+            converged = left < _UPHILL
             break
         gain = (cost - moved[2]) / cost
         values, linear, cost = moved[0], moved[1], moved[2]
@@ -180,8 +180,8 @@ def _minimise(
             cost = _cost(linear, settings)
             information, scores, gradient = _normal(shooting, values, scales, linear, settings)
             continue
-        left = ahead(information, gradient, values, scales, bounds) * _count(linear) / cost
-        if gain < _FLAT or left < settings.tolerance**2:
+        left = ahead(information, scores, values, scales, bounds)
+        if gain < _FLAT or left < settings.tolerance:
             converged = True
             break
     pieces: list[Pieces] = shooting.pieces

@@ -36,11 +36,17 @@ def bounded_step(
 
 def ahead(
     information: Array,
-    gradient: Array,
+    scores: Array,
     values: Mapping[str, float],
     scales: Mapping[str, float],
     bounds: Sequence[tuple[float, float] | None],
 ) -> float:
-    """Squared length of the step that would come next, in the metric of the information (the Newton decrement)."""
-    change = bounded_step(information, gradient, values, scales, bounds, LEAST_DAMPING)
-    return float(change @ information @ change)
+    """The step that would come next, in standard errors of the parameter that it moves furthest.
+
+    Of errors that take the ``scores`` (S, P) of whole pieces as independent (see `statistics`).
+    """
+    change = bounded_step(information, scores.sum(axis=0), values, scales, bounds, LEAST_DAMPING)
+    inverse = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
+    centred = scores - scores.mean(axis=0)
+    variance = np.diag(inverse @ (centred.T @ centred + information) @ inverse)
+    return float(np.max(np.abs(change) / np.sqrt(np.maximum(variance, 1e-300))))
