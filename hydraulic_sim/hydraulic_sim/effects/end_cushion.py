@@ -2,7 +2,7 @@
 
     F = −c·v·|v|·r²,   r = (|x| − stroke/2 + l)/l within the last l of the stroke, only towards the stop
 
-(leaving, a check valve feeds the piston.)
+(leaving, a check valve feeds the piston.) A cushion longer than half the stroke begins in the middle.
 
 Source: Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4 (cylinder cushioning); orifice drop ∝ v².
 """
@@ -12,7 +12,7 @@ from hydraulic_sim.effect import Effect, Parameter
 
 def force(position, velocity, stroke, coefficient, length):
     side = 1.0 if position > 0.0 else -1.0
-    depth = abs(position) - 0.5 * stroke + length
+    depth = abs(position) - max(0.5 * stroke - length, 0.0)
     if depth <= 0.0 or side * velocity <= 0.0:
         return 0.0
     r = min(depth / length, 1.0)
