@@ -541,6 +541,13 @@ def test_a_cushion_takes_speed_by_the_square_and_only_inwards(free: Build) -> No
     assert np.array_equal(leaving.velocity, np.full(100, -1.0))
 
 
+def test_a_cushion_longer_than_half_the_stroke_begins_in_the_middle(free: Build) -> None:
+    plant = Plant(free(end_cushion={"length": 1.0}).model.with_values({"stroke": 0.5}))
+    near, far = plant.initial_state(velocity=1.0).states, plant.initial_state(position=0.25, velocity=1.0).states
+    assert plant.derivative(near, 0.0)[1]["force"] == 0.0
+    assert plant.derivative(far, 0.0)[1]["force"] == pytest.approx(-2e5 * 0.25**2)
+
+
 # --- sensors --------------------------------------------------------------------------------------------------
 
 

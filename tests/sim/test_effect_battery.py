@@ -80,45 +80,51 @@ def test_the_right_hand_side_is_finite_everywhere(
             assert np.all(np.isfinite(everything_seen(plant, x, drive))), (x, drive)
 
 
-def largest_jump(function: Callable[[float], Array], halvings: int = 46) -> float:
-    """How much ``function`` (of 0…1) still changes, relative to its size, across the steepest of ever smaller steps.
+def largest_jump(function: Callable[[float], float], halvings: int = 46) -> float:
+    """What ``function`` (of 0…1) still changes across ever smaller intervals around its sharpest bend, over its range.
 
-    Of a continuous function nothing is left; a jump stays.
+    Followed is the half with the larger second difference: that of a jump stays, that of a bend shrinks with the
+    interval and that of a smooth stretch with its square. Of a continuous function nothing is left in the end.
     """
-    low, high = 0.0, 1.0
-    at_low, at_high = function(low), function(high)
-    size = np.maximum(np.abs(at_low), np.abs(at_high)) + 1e-300
+    at = [function(s) for s in (0.0, 0.5, 1.0)]
+    low, width, size = 0.0, 1.0, max(map(abs, at)) + 1e-300
     for _ in range(halvings):
-        middle = 0.5 * (low + high)
-        at_middle = function(middle)
-        size = np.maximum(size, np.abs(at_middle))
-        if np.max(np.abs(at_middle - at_low) / size) >= np.max(np.abs(at_high - at_middle) / size):
-            high, at_high = middle, at_middle
+        left, right = function(low + 0.25 * width), function(low + 0.75 * width)
+        size = max(size, abs(left), abs(right))
+        width *= 0.5
+        if abs(at[0] - 2.0 * left + at[1]) >= abs(at[1] - 2.0 * right + at[2]):
+            at = [at[0], left, at[1]]
         else:
-            low, at_low = middle, at_middle
-    return float(np.max(np.abs(at_high - at_low) / size))
+            low, at = low + width, [at[1], right, at[2]]
+    return abs(at[2] - at[0]) / size
 
 
 def test_the_search_for_jumps_finds_one_and_only_one() -> None:
-    assert largest_jump(lambda s: np.array([s, 1.0 if s > 0.3217 else 0.0])) == 1.0
-    assert largest_jump(lambda s: np.array([np.tanh((s - 0.3) * 1e5), s * s])) < 1e-6
+    assert largest_jump(lambda s: 1.0 if s > 0.3217 else 0.0) == 1.0
+    assert largest_jump(lambda s: 1e6 * s + (2e6 * (s - 0.7) + 1.0 if s > 0.7 else 0.0)) > 1e-7
+    assert largest_jump(lambda s: np.tanh((s - 0.3) * 1e4) + abs(s - 0.6)) < 1e-9
 
 
 IN_THE_RIGHT_HAND_SIDE = [e for e in EFFECTS if not slots.SLOTS[e.slot].per_sample]
 
 
 @pytest.mark.parametrize("effect", IN_THE_RIGHT_HAND_SIDE, ids=ids(IN_THE_RIGHT_HAND_SIDE))
-def test_the_right_hand_side_is_continuous(
-    effect: Effect, with_effect: Callable[[Effect], Model], random_states: Callable[..., Any]
-) -> None:
-    plant = Plant(with_effect(effect))
-    draws = list(random_states(plant, seed=2, count=60))
+def test_the_right_hand_side_is_continuous(effect: Effect, bare: Model, random_states: Callable[..., Any]) -> None:
+    """Along straight lines between states far apart: what the effect returns, its own states, and the motion."""
+    plant = Plant(with_partner(effect, bare))
+    seen = [*plant.state_names, *plant.derivative(plant.initial_state().states, 0.0)[1]]
+    own = {f"{effect.name}.{state.name}" for state in effect.states}
+    wanted = {*slots.SLOTS[effect.slot].returns, *own, "velocity", "pressure_a", "pressure_b", "direction"}
+    draws = list(random_states(plant, seed=2, count=50))
     for (x0, u0), (x1, u1) in zip(draws[::2], draws[1::2], strict=True):
+        for place in (i for i, name in enumerate(seen) if name in wanted):
 
-        def between(s: float, x0: Array = x0, x1: Array = x1, u0: float = u0, u1: float = u1) -> Array:
-            return everything_seen(plant, x0 + s * (x1 - x0), u0 + s * (u1 - u0))
+            def between(
+                s: float, x0: Array = x0, x1: Array = x1, u0: float = u0, u1: float = u1, i: int = place
+            ) -> float:
+                return float(everything_seen(plant, x0 + s * (x1 - x0), u0 + s * (u1 - u0))[i])
 
-        assert largest_jump(between) < 1e-5, (x0, x1, u0, u1)
+            assert largest_jump(between) < 1e-8, (seen[place], x0, x1, u0, u1)
 
 
 ON_THE_COMMAND = [e for e in EFFECTS if e.slot == "command"]
@@ -128,12 +134,12 @@ ON_THE_COMMAND = [e for e in EFFECTS if e.slot == "command"]
 def test_effects_on_the_command_are_continuous_in_it(effect: Effect) -> None:
     values = {p.name: p.default for p in effect.parameters} | {"dt": DT}
 
-    def after(command: float) -> Array:
+    def after(command: float) -> float:
         memory = np.zeros(effect.memory)
         for u in (0.2, 0.35, command):
             given = values | {"command": u, "memory": memory}
             last = effect.kernel(*(given[a] for a in arguments(effect.kernel)))
-        return np.array([last])
+        return float(last)
 
     assert largest_jump(lambda s: after(2.0 * s - 1.0)) < 1e-6
 
