@@ -45,7 +45,7 @@ def scatter(model: Model, relative: Mapping[str, float], count: int, seed: int) 
     """``count`` copies of a model with scattered parameters, for Monte Carlo studies.
 
     ``relative``: key → standard deviation relative to the model's value; drawn normal, cut at three deviations and
-    at the bounds. The same seed gives the same models. Raises `ModelError` for an unknown key or a negative
+    at the library's bounds. The same seed gives the same models. Raises `ModelError` for an unknown key or a negative
     deviation.
     """
     for key, deviation in relative.items():
@@ -57,7 +57,7 @@ def scatter(model: Model, relative: Mapping[str, float], count: int, seed: int) 
     for _ in range(count):
         values = {}
         for key, deviation in relative.items():
-            low, high = model.entry(key).bounds or model.parameter(key).bounds
+            low, high = model.parameter(key).bounds
             factor = 1.0 + deviation * float(np.clip(generator.standard_normal(), -3.0, 3.0))
             values[key] = float(np.clip(model.value(key) * factor, low, high))
         made.append(model.with_values(values))

@@ -94,7 +94,8 @@ class Model:
     def with_values(self, values: Mapping[str, float], *, source: str | None = None) -> Model:
         """A copy with other values [SI]. A value that changes takes ``source``, and loses the standard error.
 
-        Raises `ModelError` for an unknown key or a value out of bounds, the library's or those of the entry.
+        Raises `ModelError` for an unknown key or a value out of the library's bounds. Those of an entry bind fits and
+        files only.
         """
         entries = dict(self.entries)
         for key, value in values.items():
@@ -104,10 +105,6 @@ class Model:
             except EffectError as error:
                 raise ModelError(f"{self._label}: {error}") from None
             old = entries.get(key, Entry(record.default, source=record.source))
-            try:
-                check_within(key, record, number, old.bounds)
-            except ModelError as error:
-                raise ModelError(f"{self._label}: {error}") from None
             if number != old.value:
                 old = replace(old, value=number, source="", standard_error=None)
             entries[key] = old if source is None else replace(old, source=source)

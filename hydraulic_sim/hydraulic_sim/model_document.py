@@ -13,7 +13,7 @@ from ruamel.yaml.error import CommentMark
 from ruamel.yaml.tokens import CommentToken
 
 from .effect import Parameter
-from .model import Entry, Model
+from .model import Entry, Model, check_within
 from .units import to_si
 
 FORMAT = "hydraulic-model-1"
@@ -84,6 +84,7 @@ def _write_history(top: CommentedMap, history: list[object]) -> None:
 
 
 def _write_entry(node: CommentedMap, name: str, key: str, record: Parameter, entry: Entry) -> None:
+    check_within(key, record, entry.value, entry.bounds)
     old = node.get(name)
     kept = old["value"] if isinstance(old, CommentedMap) else old
     value = kept if old is not None and to_si(kept, record.unit, key) == entry.value else quantity(entry.value, record)

@@ -258,8 +258,16 @@ def test_a_value_that_changes_takes_its_source_and_loses_its_error(write: Write)
     assert (by_hand.entry(key).source, by_hand.entry(key).standard_error) == ("", None)
     assert (fitted.entry(key).source, fitted.entry(key).standard_error) == ("fit of bag_7", None)
     assert fitted.entry(key).bounds == model.entry(key).bounds and fitted.entry(key).note == "to be measured"
+
+
+def test_a_value_beyond_its_bounds_may_be_simulated_but_not_saved(write: Write, tmp_path: Path) -> None:
+    """Bounds say how far a fit may go; a file that contradicts itself is neither written nor read."""
+    model = load_model(write(BENCH)).with_values({"coulomb_friction.level": 2500.0})
+    assert Plant(model).value("coulomb_friction.level") == 2500.0
     with pytest.raises(ModelError, match=r"coulomb_friction\.level: 2500 N is outside its bounds 0 … 2000 N"):
-        model.with_values({key: 2500.0})
+        save_model(model, tmp_path / "saved.yaml")
+    wider = model.with_entry("coulomb_friction.level", bounds=(0.0, 3000.0))
+    assert load_model(save_model(wider, tmp_path / "saved.yaml")).value("coulomb_friction.level") == 2500.0
 
 
 def test_history_grows_and_keeps_its_comments(write: Write, tmp_path: Path) -> None:
