@@ -123,9 +123,8 @@ def main() -> None:
     if c is None:
         print("C plant: no C compiler found")
     else:
-        print(
-            f"C -O3 -march=native      {c[0] * 1e3:8.1f} ms   ratio {ours / c[0]:.2f}   (positions differ by {c[1]:.1e})"
-        )
+        ratio = f"ratio {ours / c[0]:.2f} (positions differ by {c[1]:.1e})"
+        print(f"C -O3 -march=native      {c[0] * 1e3:8.1f} ms   {ratio}")
     short = chirp(2.0)
     reference = solver_seconds(base, short, "Radau", 1e-10)[1]
     mine = base.simulate(short, DT, base.initial_state()).true_position

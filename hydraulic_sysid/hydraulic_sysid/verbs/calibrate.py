@@ -76,13 +76,14 @@ def _calibrate(options: argparse.Namespace) -> int:
 
 def _print(result: dict[str, Any], console: Console) -> None:
     table = Table(title=f"{result['model']['name']}: calibrated (± standard error)", title_justify="left")
-    for title in ("parameter", "before", "after", "±", "unit", ""):
-        side = "left" if title in ("parameter", "unit", "") else "right"
-        table.add_column(title, justify=side, overflow="fold")  # type: ignore[arg-type]
+    table.add_column("parameter", no_wrap=True)
+    table.add_column("before", justify="right", no_wrap=True)
+    table.add_column("after", justify="left", no_wrap=True)
     for p in result["parameters"]:
-        note = f"at its {p['at_bound']} value" if p["at_bound"] else ""
-        unit = "" if p["unit"] == "1" else p["unit"]
-        table.add_row(p["key"], *(f"{p[k]:.4g}" for k in ("before", "value")), _error(p["standard_error"]), unit, note)
+        unit = "" if p["unit"] == "1" else f" {p['unit']}"
+        note = ", at bound" if p["at_bound"] else ""
+        after = f"{p['value']:.4g} ± {_error(p['standard_error'])}{unit}{note}"
+        table.add_row(p["key"], f"{p['before']:.4g}", after)
     console.print(table)
     table = Table(title="residual over noise", title_justify="left")
     for title in ("record", "", "channel", "before", "after"):
