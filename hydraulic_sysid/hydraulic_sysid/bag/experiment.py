@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from hydraulic_interfaces.contract import ABORTED, FINISHED, STARTED
 from hydraulic_sysid.bag.types import string_data
 
-STARTED = "started"
-ENDED = ("finished", "aborted")
+ENDED = (FINISHED, ABORTED)
 
 
 class ExperimentLog:

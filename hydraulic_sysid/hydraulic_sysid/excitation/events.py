@@ -6,11 +6,11 @@ import json
 
 from hydraulic_sysid.excitation.run import ExcitationRun
 
-STARTED, FINISHED, ABORTED = "started", "finished", "aborted"
-
 
 def experiment_event(kind: str, run: ExcitationRun, started_ns: int, stamp_ns: int, reason: str = "") -> str:
     """One event: `kind` at `stamp_ns`, of the run that began with the state of `started_ns`.
+
+    `kind` is STARTED, FINISHED or ABORTED of the contract.
 
     Keys: event, stamp_ns, started_ns (the same in all events of a run), reason (of an abort), samples and
     played (how many the plan has, and how many of them were commanded), plan (complete: `Plan.from_mapping`

@@ -6,10 +6,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from hydraulic_interfaces.contract import EXCITATION_NODE
+from hydraulic_interfaces.contract import ABORTED, EXCITATION_NODE, FINISHED, STARTED
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_sysid.excitation.applied import AppliedDriveCheck
-from hydraulic_sysid.excitation.events import ABORTED, FINISHED, STARTED, experiment_event
+from hydraulic_sysid.excitation.events import experiment_event
 from hydraulic_sysid.excitation.plan import Plan
 from hydraulic_sysid.excitation.plant_report import PlantReport
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase

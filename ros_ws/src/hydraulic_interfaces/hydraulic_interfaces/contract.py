@@ -24,6 +24,9 @@ DRIVE_LIMIT_V = 10.0
 WATCHDOG_S = 0.05
 RATE_HZ = 1000.0
 
+STARTED, FINISHED, ABORTED = "started", "finished", "aborted"
+"""What `event` says in the JSON on the topic `experiment`: a run began, was played to its end, was broken off."""
+
 
 @dataclass(frozen=True)
 class Topic:
