@@ -96,6 +96,33 @@ def test_disabled_is_zero_and_keeps_no_command_for_later() -> None:
     assert one.drive(1) == 0.0
 
 
+@pytest.mark.parametrize("between", ["drive", "accept"])
+@pytest.mark.parametrize("undone", ["disable", "stop"])
+def test_what_is_undone_within_one_cycle_still_takes_the_drive_away(undone: str, between: str) -> None:
+    one = gate()
+    one.accept(command(0, 2.0), 0)
+    assert one.drive(0) == 2.0
+    if undone == "disable":
+        one.enable(False)
+    else:
+        one.stop("emergency stop")
+        one.reset()
+    one.enable(True)
+    if between == "accept":
+        # The source in command is released as well: whoever speaks first is obeyed.
+        assert one.accept(command(MS, 3.0, "b"), MS) is Verdict.ACCEPTED
+    assert one.drive(MS) == (3.0 if between == "accept" else 0.0)
+    assert one.timeouts == 0
+
+
+def test_enabling_what_is_enabled_keeps_the_drive() -> None:
+    one = gate()
+    one.accept(command(0, 2.0), 0)
+    one.drive(0)
+    one.enable(True)
+    assert one.drive(MS) == 2.0
+
+
 def test_stop_is_latched_and_reset_does_not_enable() -> None:
     one = gate()
     one.accept(command(0), 0)

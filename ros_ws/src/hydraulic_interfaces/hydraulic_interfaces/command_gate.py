@@ -11,6 +11,8 @@ Rules, the same for a simulated and a real actuator:
 - A stop (emergency or fault) is latched until `reset`. Reset leaves the gate disabled: moving again takes
   `enable`.
 - While disabled or stopped the drive is 0 V and commands are refused, so that none waits for the enable.
+- Enabling, disabling and stopping each take the held drive away, also where one undoes the other before the next
+  cycle: what was commanded before does not move anything after.
 
 The gate knows no threads: `accept` and `drive` belong to one thread, the switches may be thrown from another.
 """
@@ -61,6 +63,8 @@ class CommandGate:
         self._source = ""
         self._drive = 0.0
         self._heard_ns: int | None = None
+        # A new object per change of `enabled`: unlike a count it loses none where two threads change it at once.
+        self._change = self._seen_change = object()
 
     @property
     def watchdog(self) -> float:
@@ -85,12 +89,16 @@ class CommandGate:
 
     def enable(self, on: bool) -> bool:
         """Let commands through, or not; False when a latched stop forbids it."""
-        self.enabled = on and not self.stopped
+        allowed = on and not self.stopped
+        if allowed != self.enabled:
+            self._change = object()
+        self.enabled = allowed
         return self.enabled == on
 
     def stop(self, reason: str) -> None:
         """Latch 0 V until `reset`; the first reason is kept."""
         self.stop_reason = self.stop_reason or reason or "stopped"
+        self._change = object()
         self.enabled = False
 
     def reset(self) -> None:
@@ -110,6 +118,7 @@ class CommandGate:
 
     def accept(self, command: Command, now_ns: int) -> Verdict:
         """Judge a command that arrived at `now_ns`, and hold its drive if it is obeyed."""
+        self._follow_changes()
         verdict = self._judge(command, now_ns)
         self.counts[verdict] += 1
         if verdict.obeyed:
@@ -128,6 +137,7 @@ class CommandGate:
 
     def drive(self, now_ns: int) -> float:
         """The drive to apply now, V: always finite and within the limits."""
+        self._follow_changes()
         if self._heard_ns is not None and not self._in_command(now_ns):
             # Only a silence that takes a drive away from an enabled actuator is a fault of the source.
             self.timeouts += self.enabled
@@ -157,6 +167,12 @@ class CommandGate:
     def _in_command(self, now_ns: int) -> bool:
         # A clock that jumped back must not keep an old command alive.
         return self._heard_ns is not None and 0 <= now_ns - self._heard_ns <= self._watchdog_ns
+
+    def _follow_changes(self) -> None:
+        change = self._change
+        if change is not self._seen_change:
+            self._seen_change = change
+            self._release()
 
     def _release(self) -> None:
         self._source, self._drive, self._heard_ns = "", 0.0, None
