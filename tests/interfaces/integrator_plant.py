@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from hydraulic_interfaces.plant_backend import BackendError, PlantBackend
 from hydraulic_interfaces.samples import PlantSample
 
 STROKE = 0.2
+REFUSED_GAIN = 0.75  # within the declared range, but not for this plant
 
 
 class IntegratorPlant(PlantBackend):
@@ -24,7 +26,9 @@ class IntegratorPlant(PlantBackend):
     def parameters(self) -> Sequence[ParameterSpec]:
         return (
             ParameterSpec("journal", "", "file that receives one line per call"),
-            ParameterSpec("trouble", "", "configure | activate | step | deactivate | fault: what goes wrong"),
+            ParameterSpec(
+                "trouble", "", "configure | activate | step | hang | deactivate | fault | set: what goes wrong"
+            ),
             ParameterSpec("real_time_factor", 1.0, "plant seconds per wall second", "1", 0.01, 100.0),
             ParameterSpec("publish_clock", False, "be the clock"),
         )
@@ -38,6 +42,11 @@ class IntegratorPlant(PlantBackend):
         return (ParameterSpec("model.gain", self._gain, "velocity per drive", "m/s/V", 0.0, 1.0, live=True),)
 
     def set_parameter(self, name: str, value: Any) -> None:
+        if value == REFUSED_GAIN:
+            raise BackendError("the plant cannot follow")
+        if self._trouble == "set":
+            self._note("set hangs")
+            time.sleep(3600.0)
         self._gain = value
         self._note(f"set {name} {value}")
 
@@ -52,6 +61,11 @@ class IntegratorPlant(PlantBackend):
     def step(self, stamp_ns: int, drive: float, dt: float) -> PlantSample:
         if drive and self._trouble == "step":
             raise ArithmeticError("integrator burst")
+        if drive and self._trouble == "hang":
+            self._note("step hangs")
+            while not Path(self._journal).with_name("go on").exists():
+                time.sleep(0.01)
+            self._note("step returns")
         if drive and self._trouble == "fault":
             self.fault = "cable break"
         sample = PlantSample(

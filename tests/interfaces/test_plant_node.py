@@ -119,6 +119,39 @@ def test_a_plant_that_cannot_be_deactivated_is_reported(start: Any, client: Any,
     assert client.state() == "unconfigured"
 
 
+def test_a_value_that_the_plant_refuses_changes_nothing(
+    start: Any, client: Any, wait_until: Any, journal: Path
+) -> None:
+    from rcl_interfaces.msg import Parameter, ParameterValue
+
+    start()
+    wait_until(lambda: client.state() == "active", "an active plant")
+
+    def values() -> list[float]:
+        names = ["watchdog", "model.gain"]
+        answer = client.call("rcl_interfaces/srv/GetParameters", f"{PLANT}/get_parameters", names=names)
+        return [value.double_value for value in answer.values]
+
+    before = values()
+    refused = set_parameter(client, "model.gain", 0.75)
+    assert not refused.successful and refused.reason == "model.gain: the plant cannot follow"
+    assert values() == before
+    # Of a request that is to be taken as a whole, what was applied already is taken back.
+    both = [
+        Parameter(name=name, value=ParameterValue(type=3, double_value=value))
+        for name, value in (("watchdog", 0.5), ("model.gain", 0.75))
+    ]
+    kind, name = "rcl_interfaces/srv/SetParametersAtomically", f"{PLANT}/set_parameters_atomically"
+    refused = client.call(kind, name, parameters=both).result
+    assert not refused.successful and "cannot follow" in refused.reason
+    assert values() == before
+    health = client.diagnostics()  # from after the refusal
+    wait_until(lambda: health["watchdog_s"], "the watchdog time in use")
+    assert health["watchdog_s"] == "2"
+    assert set_parameter(client, "model.gain", 0.25).successful and values()[1] == 0.25
+    assert "set model.gain 0.75" not in journal.read_text()
+
+
 def test_a_misspelt_parameter_is_named(start: Any) -> None:
     start("-p", "wachdog:=1.0").says("no parameter has the name 'wachdog'")
 

@@ -40,7 +40,11 @@ class PlantBackend(ABC):
         """Load, connect, compile: whatever takes long. Returns the parameters that are known only now."""
 
     def set_parameter(self, name: str, value: Any) -> None:  # noqa: B027 - nothing to set is a valid plant
-        """Take the new value of a live parameter, from the next step on."""
+        """Take the new value of a live parameter, from the next step on.
+
+        Raises, with a text for the user and nothing changed, where the plant cannot take it: the parameter of the node
+        then keeps its value too.
+        """
 
     @abstractmethod
     def activate(self) -> None:

@@ -19,8 +19,8 @@ _UNBOUNDED_INTEGER = 2**63 - 1
 class ParameterTable:
     """The declared parameters of a node.
 
-    `apply(name, value)` is called after a live parameter was set; `locked()` says whether the others may not
-    be set now.
+    `apply(name, value)` is called when a live parameter is to be set. If it raises, nothing is set: the caller hears
+    why, and what was applied of the same request is taken back. `locked()` says whether the others may not be set now.
     """
 
     def __init__(
@@ -36,7 +36,6 @@ class ParameterTable:
         self._specs: dict[str, ParameterSpec] = {}
         self._declaring = False
         node.add_on_set_parameters_callback(self._check)
-        node.add_post_set_parameters_callback(self._applied)
         self.declare(specs)
 
     def declare(self, specs: Iterable[ParameterSpec]) -> None:
@@ -88,15 +87,39 @@ class ParameterTable:
             if not (spec.live or self._declaring) and self._locked is not None and self._locked():
                 reason = f"{spec.name} is read when the node is configured: clean up the node to set it"
                 return SetParametersResult(successful=False, reason=reason)
-        return SetParametersResult(successful=True)
+        return self._take(parameters)
 
-    def _applied(self, parameters: Sequence[Parameter]) -> None:
-        if self._declaring or self._apply is None:
-            return
+    def _take(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+        """Apply live parameters that were found acceptable, all or none."""
+        applied: list[tuple[str, Any]] = []
         for parameter in parameters:
             spec = self._specs.get(parameter.name)
-            if spec is not None and spec.live:
+            if spec is None or not spec.live or self._declaring or self._apply is None:
+                continue
+            before = self[spec.name]
+            try:
                 self._apply(spec.name, spec.check(parameter.value))
+            except Exception as error:  # whatever a plant throws: the caller must have an answer
+                reason = f"{spec.name}: {_text(error)}"
+                return SetParametersResult(successful=False, reason=reason + self._take_back(applied, self._apply))
+            applied.append((spec.name, before))
+        return SetParametersResult(successful=True)
+
+    def _take_back(self, applied: list[tuple[str, Any]], apply: Callable[[str, Any], None]) -> str:
+        """Apply the values from before, last first; what to add to the reason if one is refused."""
+        problems = ""
+        for name, before in reversed(applied):
+            try:
+                apply(name, before)
+            except Exception as error:
+                problems += f"; {name} could not be set back to {before!r}: {_text(error)}"
+        if problems:
+            self._node.get_logger().error(f"parameters and plant differ{problems}")
+        return problems
+
+
+def _text(error: Exception) -> str:
+    return str(error) or type(error).__name__
 
 
 def descriptor(spec: ParameterSpec) -> ParameterDescriptor:
