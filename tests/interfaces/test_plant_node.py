@@ -119,6 +119,62 @@ def test_a_plant_that_cannot_be_deactivated_is_reported(start: Any, client: Any,
     assert client.state() == "unconfigured"
 
 
+def hanging(start: Any, client: Any, wait_until: Any, journal: Path) -> Any:
+    process = start("-p", "trouble:=hang", "-p", "enable_on_activate:=true")
+    wait_until(lambda: client.state() == "active", "an active plant")
+    client.source("hand", 1.0)
+    wait_until(lambda: "step hangs" in journal.read_text(), "a step that hangs")
+    return process
+
+
+def test_a_plant_that_hangs_is_neither_released_nor_configured_before_it_returns(
+    start: Any, client: Any, wait_until: Any, journal: Path
+) -> None:
+    process = hanging(start, client, wait_until, journal)
+    assert not client.change_state("deactivate")
+    process.says("the plant loop hangs in its backend")
+    assert not client.change_state("configure")
+    process.says("cannot configure: the plant loop hangs in its backend")
+    assert client.state() == "unconfigured"
+    lines = journal.read_text().splitlines()
+    assert lines.count("configure") == 1 and "cleanup" not in lines, "the thread is still in the plant"
+    journal.with_name("go on").touch()
+    wait_until(lambda: "cleanup" in journal.read_text(), "the plant released")
+    after = journal.read_text().splitlines()
+    after = after[after.index("step returns") :]
+    assert after == ["step returns", "deactivate after 0.0 V", "cleanup"]
+    assert client.change_state("configure") and client.change_state("activate")
+
+
+def test_a_process_that_leaves_a_hanging_plant_says_so(start: Any, client: Any, wait_until: Any, journal: Path) -> None:
+    process = hanging(start, client, wait_until, journal)
+    process.interrupt(signal.SIGTERM)
+    assert process.wait() == 1, process.output()
+    assert "the plant may not be at 0 V" in process.output()
+    assert "cleanup" not in journal.read_text().splitlines()
+
+
+def test_a_process_whose_services_hang_leaves_at_zero_volts(
+    start: Any, client: Any, wait_until: Any, journal: Path
+) -> None:
+    from rcl_interfaces.msg import Parameter, ParameterValue
+    from rcl_interfaces.srv import SetParameters
+
+    process = start("-p", "trouble:=set", "-p", "enable_on_activate:=true")
+    states = client.collect("state")
+    client.source("hand", 1.0)
+    wait_until(lambda: states and states[-1].effort[1] == 1.0, "the commanded drive")
+    setter = client.node.create_client(SetParameters, f"{PLANT}/set_parameters")
+    assert setter.wait_for_service(60.0)
+    change = Parameter(name="model.gain", value=ParameterValue(type=3, double_value=0.25))
+    setter.call_async(SetParameters.Request(parameters=[change]))  # there will be no answer
+    wait_until(lambda: "set hangs" in journal.read_text(), "a call that hangs")
+    process.interrupt(signal.SIGTERM)
+    assert process.wait() == 1, process.output()
+    assert "leaving in the middle of a call" in process.output()
+    assert journal.read_text().splitlines()[-1] == "deactivate after 0.0 V"
+
+
 def test_a_value_that_the_plant_refuses_changes_nothing(
     start: Any, client: Any, wait_until: Any, journal: Path
 ) -> None:

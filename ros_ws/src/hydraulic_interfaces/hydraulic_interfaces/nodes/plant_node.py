@@ -3,7 +3,7 @@
 States: `configure` loads the plant, `activate` starts the loop at 0 V and *not enabled* (parameter
 `enable_on_activate` changes that), the service `enable` lets commands through. `emergency_stop` works in
 every state and survives all transitions until `reset`. A backend that fails leaves the node unconfigured, at
-0 V.
+0 V. One that hangs does so too, but is not released, and not configured again, before its step has returned.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ SUCCESS, FAILURE, ERROR = (
 )
 _WATCH_PERIOD_S = 0.1
 _REPORT_EVERY = 5
+_HANGS = "the plant loop hangs in its backend"
 
 PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("rate", RATE_HZ, "sampling rate of the plant", "Hz", 1.0, 5000.0),
@@ -54,6 +55,7 @@ class PlantNode(LifecycleNode):
         self._state = "unconfigured"
         self._error = ""
         self._loop: PlantLoop | None = None
+        self._hung: PlantLoop | None = None
         self._last_stamp_ns = 0
         self._late_parameters: list[str] = []
         self.gate = CommandGate()
@@ -80,8 +82,20 @@ class PlantNode(LifecycleNode):
         """Lifecycle state by its name."""
         return self._state
 
+    def end_loop(self, patience: float) -> bool:
+        """Latch 0 V and end the loop, from any thread, for a process that leaves; False if it hangs for `patience` [s].
+
+        The orderly way is the lifecycle; this one is for when the thread that serves it does not return.
+        """
+        self.gate.stop("leaving")
+        loop = self._loop or self._hung
+        return loop is None or loop.stop(patience)
+
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the parameters and load the plant; FAILURE with a log line if that cannot be done."""
+        if self._hangs():
+            self._complain(f"cannot configure: {_HANGS}; wait until it returns, or end this process")
+            return FAILURE
         self._error = ""
         try:
             values = self._table.values()
@@ -136,6 +150,7 @@ class PlantNode(LifecycleNode):
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """From whatever state: 0 V, loop stopped, plant released."""
+        self._hangs()
         self._halt()
         if self._state == "inactive":
             self._release("")
@@ -150,15 +165,18 @@ class PlantNode(LifecycleNode):
 
     def _halt(self) -> bool:
         """End the loop at 0 V; False if it had failed or hangs."""
-        loop, self._loop = self._loop, None
+        loop = self._loop
         if loop is None:
             return True
         try:
             self._switch(False)
         except Exception as error:
             self._complain(f"disabling failed: {error}")
-        if not loop.stop():
-            self._complain("the plant loop hangs in its backend")
+        ended = loop.stop()
+        self._loop = None
+        if not ended:
+            self._complain(_HANGS)
+            self._hung = loop
             return False
         if loop.error is not None:
             self._complain(f"the plant loop ended: {type(loop.error).__name__}: {loop.error}")
@@ -171,11 +189,25 @@ class PlantNode(LifecycleNode):
             self._complain(problem)
         self._table.undeclare(name for name in self._late_parameters if self.has_parameter(name))
         self._late_parameters = []
+        if self._hung is None:  # else its thread is still at work in what would be released
+            self._clean_up()
+        self._state = "unconfigured"
+
+    def _clean_up(self) -> None:
         try:
             self._backend.cleanup()
         except Exception as error:
             self._complain(f"cleanup failed: {error}")
-        self._state = "unconfigured"
+
+    def _hangs(self) -> bool:
+        """Whether a loop that hung still does; once it has ended, the plant is released."""
+        loop = self._hung
+        if loop is None or loop.alive:
+            return loop is not None
+        self._hung, self._last_stamp_ns = None, loop.last_stamp_ns
+        self.get_logger().warning("the plant loop that hung in its backend has ended")
+        self._clean_up()
+        return False
 
     def _switch(self, on: bool) -> None:
         self._backend.set_enabled(self.gate.enable(on) and on)
@@ -229,6 +261,7 @@ class PlantNode(LifecycleNode):
             self.trigger_activate()
 
     def _watch(self) -> None:
+        self._hangs()
         loop = self._loop
         if loop is not None and loop.error is not None:
             self.trigger_deactivate()

@@ -20,13 +20,15 @@ from hydraulic_interfaces.plant_backend import PlantBackend
 
 _SPIN_S = 1.0
 _PATIENCE_S = 5.0
+_LOOP_PATIENCE_S = 1.0
 
 
 def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = None) -> int:
-    """Run the plant node over `backend` until SIGINT or SIGTERM; exit code 0, or 2 for bad options.
+    """Run the plant node over `backend` until SIGINT or SIGTERM; exit code 0, 1, or 2 for bad options.
 
     Three threads: this one waits for a signal, one serves ROS, the plant loop runs in its own. A signal leads
     through the lifecycle's shutdown while everything still works, so the last thing the plant sees is 0 V.
+    Where that is not possible, because the thread that serves ROS or the plant loop does not return, the code is 1.
     """
     parser = command_line.parser(description, (*PARAMETERS, *backend.parameters()))
     parser.add_argument("--autostart", action="store_true", help="configure and activate at start")
@@ -49,16 +51,25 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     executor.wake()
     server.join(_PATIENCE_S)
     if server.is_alive():
-        # A transition that takes long (loading, compiling) holds the thread; the plant is not active then.
-        print("leaving in the middle of a transition", file=sys.stderr, flush=True)
-        os._exit(0)
+        # Loading or compiling takes long, with the plant inactive; but an active one may hang in a call as well.
+        ended = node.end_loop(_LOOP_PATIENCE_S)
+        print(f"leaving in the middle of a call that does not return; {_end(ended)}", file=sys.stderr, flush=True)
+        os._exit(1)
     if node.state != "finalized":
         node.trigger_shutdown()
-    with exit_guard(0):
+    ended = node.end_loop(_LOOP_PATIENCE_S)
+    if not ended:
+        print(_end(ended), file=sys.stderr)
+    code = 0 if ended else 1
+    with exit_guard(code):
         executor.shutdown()
         node.destroy_node()
         rclpy.try_shutdown()
-    return 0
+    return code
+
+
+def _end(ended: bool) -> str:
+    return "the plant loop has ended" if ended else "the plant loop hangs: the plant may not be at 0 V"
 
 
 def _serve(executor: SingleThreadedExecutor, node: PlantNode, stop: threading.Event) -> None:
