@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hydraulic_interfaces.contract import topic
-from hydraulic_sysid.bag.experiment import ENDED, STARTED
+from hydraulic_interfaces.contract import FINISHED, STARTED, topic
+from hydraulic_sysid.bag.experiment import ENDED
 from hydraulic_sysid.bag.reader import Bag
 from hydraulic_sysid.bag.types import string_data
 from hydraulic_sysid.records.errors import BagError
@@ -71,7 +71,7 @@ def _span(begin: dict[str, Any], following: Sequence[dict[str, Any]], stamps: ND
     else:
         experiment.update({key: value for key, value in end.items() if key not in ("plan", "stamp_ns")})
         experiment["end_stamp_ns"] = until
-        if end["event"] != "finished":
+        if end["event"] != FINISHED:
             notes.append(f"experiment: {end['event']} ({end.get('reason') or 'no reason given'})")
     first, last = np.searchsorted(stamps, [begin["stamp_ns"], until], side="left")
     return Span(int(first), int(last), "", experiment, notes)

@@ -13,6 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Protocol
 
+from hydraulic_interfaces.contract import ABORTED
 from hydraulic_sysid.excitation import load_plan
 
 from .errors import DemoError
@@ -161,7 +162,7 @@ def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, st
         crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
         steps.done()
         return ""
-    ends = [event for event in client.events(begun_ns) if event["event"] == "aborted"]
+    ends = [event for event in client.events(begun_ns) if event["event"] == ABORTED]
     if not ends:
         excitation.may_end = ()
         crew.check(step)
