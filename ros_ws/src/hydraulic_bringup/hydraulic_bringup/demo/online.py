@@ -32,6 +32,7 @@ WATCHDOG_S = 0.2
 ATTEMPTS = {"sim": 2, "can": 1}
 _START_S = 90.0  # the first start on a machine compiles the physics
 _STEP_S = 20.0
+_LAST_WORDS_S = 3.0
 
 
 class Steps(Protocol):
@@ -162,12 +163,22 @@ def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, st
         crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
         steps.done()
         return ""
-    ends = [event for event in client.events(begun_ns) if event["event"] == ABORTED]
+    ends = _aborts(client, begun_ns)
     if not ends:
         excitation.may_end = ()
         crew.check(step)
     crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
     return str(ends[-1]["reason"])
+
+
+def _aborts(client, since_ns: int) -> list[dict]:
+    """The aborts that were told since then; the process may be gone a moment before its last words are here."""
+    deadline = time.monotonic() + _LAST_WORDS_S
+    while True:
+        ends = [event for event in client.events(since_ns) if event["event"] == ABORTED]
+        if ends or time.monotonic() > deadline:
+            return ends
+        time.sleep(0.05)
 
 
 def timestamped_folder(root: Path, name: str) -> Path:
