@@ -219,6 +219,9 @@ def test_a_node_that_dies_fails_its_step_and_ends_the_run(demo: Any, wait_until:
 def test_an_abort_is_answered_by_another_run_and_ctrl_c_by_an_end(demo: Any, wait_until: Any) -> None:
     run = demo("--quick")
     excited(run, wait_until)
+    # A second into the run every node has found every other: who leaves sooner may not be heard leaving.
+    bag = run.out / "chirp"
+    wait_until(lambda: sum(f.stat().st_size for f in bag.glob("*.mcap")) > 200_000, "a second of the record", 30.0)
     os.kill(run.pid_of("hydraulic_sysid.nodes.excitation"), signal.SIGINT)  # which makes it abort the experiment
     excited(run, wait_until, "excitation_chirp_2.log")
     (aborted,) = read_bag(run.out / "chirp.aborted")
