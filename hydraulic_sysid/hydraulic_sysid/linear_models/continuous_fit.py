@@ -1,0 +1,133 @@
+"""Fit a continuous-time transfer function to records: SRIVC for the start, output error for the result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import IdentificationError
+from .noise_model import fit_noise
+from .refined_iv import refined_iv
+from .separable import Point, Problem, refine
+from .series import experiments
+from .transfer_function import TransferFunctionModel, TransferFunctionOrder
+
+Array = NDArray[np.float64]
+METHODS = ("output error", "srivc")
+_CUTOFFS = (0.3, 1.0, 3.0, 10.0, 30.0)
+
+
+def fit_transfer_function(
+    drives: Sequence[ArrayLike],
+    outputs: Sequence[ArrayLike],
+    dt: float,
+    order: TransferFunctionOrder | None = None,
+    *,
+    delay: float = 0.0,
+    offsets: str = "estimate",
+    method: str = "output error",
+) -> TransferFunctionModel:
+    """Continuous-time model of one or several experiments, sampled alike every ``dt`` seconds, inputs held.
+
+    Works for an integrating plant (drive to position), whose pole at 0 is estimated like the others, or fixed with
+    ``order.integrator``. The initial state of every experiment is estimated. ``delay`` is the dead time in seconds.
+    ``offsets``: ``estimate`` adds the constant c to the unknowns, ``remove`` subtracts the means, ``none`` neither.
+
+    :raises IdentificationError: too few samples, unequal lengths, an input that does not excite the order.
+    """
+    order = order or TransferFunctionOrder()
+    if method not in METHODS:
+        raise IdentificationError(f"method: {method!r} is none of {', '.join(METHODS)}")
+    if not (np.isfinite(dt) and dt > 0.0 and np.isfinite(delay) and delay >= 0.0):
+        raise IdentificationError(f"sampling time {dt:g} s must be positive and delay {delay:g} s not negative")
+    pairs, u0, y0 = experiments(drives, outputs, offsets)
+    inputs, measured = [u for u, _ in pairs], [y for _, y in pairs]
+    _check(inputs, measured, order)
+    scale = _typical_frequency(inputs, dt)
+    problem = Problem(
+        inputs, measured, scale * dt, order.poles, order.zeros, order.integrator, offsets == "estimate", delay / dt
+    )
+    start = _start(problem)
+    point, converged = refine(problem, start) if method == "output error" else (start, True)
+    return _model(problem, point, scale, dt, order, delay, (u0, y0), method, converged)
+
+
+def _check(inputs: Sequence[Array], outputs: Sequence[Array], order: TransferFunctionOrder) -> None:
+    unknowns = order.free_poles + order.zeros + 2 + order.poles * len(inputs)
+    samples = sum(y.size for y in outputs)
+    if samples <= 2 * unknowns:
+        raise IdentificationError(f"{samples} samples are too few for {unknowns} unknowns, initial states included")
+    for number, (u, y) in enumerate(zip(inputs, outputs, strict=True)):
+        if not (np.ptp(u) > 0.0 and np.ptp(y) > 0.0):
+            raise IdentificationError(f"experiment {number + 1}: input and output must move")
+
+
+def _typical_frequency(inputs: Sequence[Array], dt: float) -> float:
+    """The frequency [rad/s] below which half of the inputs' power lies."""
+    longest = max(inputs, key=len)
+    power = np.abs(np.fft.rfft(longest - longest.mean())) ** 2
+    middle = int(np.searchsorted(np.cumsum(power), 0.5 * power.sum()))
+    return float(2.0 * np.pi * max(middle, 1) / (longest.size * dt))
+
+
+def _start(problem: Problem) -> Point:
+    """The best that SRIVC finds from state-variable filters of several cut-off frequencies below Nyquist's."""
+    highest = 0.8 * np.pi / problem.step
+    found = [refined_iv(problem, cutoff) for cutoff in sorted({min(c, highest) for c in _CUTOFFS})]
+    usable = [point for point in found if point is not None and np.isfinite(point.cost)]
+    if not usable:
+        raise IdentificationError("no model of this order can be simulated on these data: lower the order")
+    return min(usable, key=lambda p: p.cost)
+
+
+def _model(
+    problem: Problem,
+    point: Point,
+    scale: float,
+    dt: float,
+    order: TransferFunctionOrder,
+    delay: float,
+    means: tuple[float, float],
+    method: str,
+    converged: bool,
+) -> TransferFunctionModel:
+    n, m = order.poles, order.zeros
+    alpha = problem.full(point.alpha)
+    size = scale ** np.concatenate(
+        (np.arange(1, order.free_poles + 1), np.arange(n - m, n + 1), [n] if problem.constant else [])
+    )
+    joint = np.hstack((point.jacobian, point.columns))
+    lengths = np.linalg.norm(joint, axis=0)
+    _, singular, right = np.linalg.svd(joint / lengths, full_matrices=False)
+    condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
+    if condition > 1e12:
+        raise IdentificationError(
+            f"the record does not excite a model of this order (condition number {condition:.1e}): "
+            "lower the order or use a richer drive"
+        )
+    samples = point.residual.size
+    weights = (right.T / singular) / lengths[:, None]
+    variance = point.cost / (samples - joint.shape[1])
+    errors = np.sqrt(variance * np.sum(weights**2, axis=1))[: size.size]
+    bounds = np.cumsum([y.size for y in problem.outputs])[:-1]
+    noise, one_step = fit_noise(np.split(point.residual, bounds))
+    return TransferFunctionModel(
+        order=order,
+        dt=dt,
+        numerator=point.theta[: m + 1] * scale ** np.arange(n - m, n + 1),
+        denominator=np.concatenate(([1.0], alpha * scale ** np.arange(1, n + 1))),
+        delay=delay,
+        constant=float(point.theta[m + 1] * scale**n) if problem.constant else 0.0,
+        input_offset=means[0],
+        output_offset=means[1],
+        standard_errors=errors * size,
+        loss=point.cost / samples,
+        samples=samples,
+        condition_number=condition,
+        noise=noise,
+        one_step_loss=one_step,
+        method=method,
+        converged=converged,
+    )

@@ -1,0 +1,9 @@
+"""The error of every fit of this package."""
+
+from __future__ import annotations
+
+from hydraulic_sysid.errors import HydraulicSysidError
+
+
+class IdentificationError(HydraulicSysidError, ValueError):
+    """The data cannot give the model that was asked for (too short, input not moving, wrong order)."""

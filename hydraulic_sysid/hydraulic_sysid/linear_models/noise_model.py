@@ -1,0 +1,39 @@
+"""Autoregression of a simulation error: what turns a free run into a one-step prediction.
+
+D(q)·v(t) = e(t), D(q) = 1 + d₁·q⁻¹ + … + d_k·q⁻ᵏ, by least squares; the order is the one of least AIC.
+L. Ljung, *System Identification: Theory for the User*, 2nd ed., Prentice Hall 1999, sections 4.2 and 16.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+LONGEST = 12
+
+
+def fit_noise(errors: Sequence[Array], longest: int = LONGEST) -> tuple[Array, float]:
+    """Coefficients ``(k,)`` d₁ … d_k, 0 ≤ k ≤ ``longest``, and the mean squared prediction error that they leave.
+
+    ``errors`` are the simulation errors ``(N_i,)`` of the experiments. All orders are compared on the same samples.
+    """
+    longest = max(0, min(longest, (min(v.size for v in errors) - 1) // 10))
+    target = np.concatenate([v[longest:] for v in errors])
+    past = np.vstack(
+        [np.stack([-v[longest - k : v.size - k] for k in range(1, longest + 1)], axis=1) for v in errors]
+        if longest
+        else [np.empty((v.size, 0)) for v in errors]
+    )
+    best, least, loss = np.empty(0), np.inf, float(np.mean(target**2))
+    if loss == 0.0:
+        return best, 0.0
+    for order in range(longest + 1):
+        d, *_ = np.linalg.lstsq(past[:, :order], target, rcond=None)
+        left = float(np.mean((target - past[:, :order] @ d) ** 2))
+        criterion = target.size * np.log(max(left, np.finfo(float).tiny)) + 2.0 * order
+        if criterion < least:
+            best, least, loss = d, criterion, left
+    return best, loss
