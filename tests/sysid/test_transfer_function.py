@@ -1,4 +1,4 @@
-"""Continuous-time transfer functions: known plants recovered, peers agreed with, an integrating nonlinear plant fitted."""
+"""Continuous-time transfer functions: known plants recovered, peers agreed with, the nonlinear plant fitted."""
 
 from __future__ import annotations
 

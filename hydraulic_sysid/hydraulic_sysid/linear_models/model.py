@@ -1,0 +1,45 @@
+"""What every identified model can do, whatever its structure."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .poles import Pole
+
+Array = NDArray[np.float64]
+
+
+class LinearModel(Protocol):
+    """An identified single-input, single-output model, sampled or continuous."""
+
+    @property
+    def dt(self) -> float:
+        """Sampling time [s] of the data that it was estimated from and that it is run on."""
+
+    @property
+    def loss(self) -> float:
+        """Mean squared error, over the estimation data, that the fit has made small."""
+
+    @property
+    def samples(self) -> int:
+        """How many samples it was estimated from."""
+
+    @property
+    def parameters(self) -> int:
+        """How many values of the model were estimated."""
+
+    @property
+    def memory(self) -> int:
+        """Samples at the beginning for which there is no one-step prediction (NaN)."""
+
+    def simulate(self, drive: ArrayLike, output: ArrayLike | None = None) -> Array:
+        """Free run ``(N,)`` on the drive, from the initial state that fits ``output`` best; NaN if unstable."""
+
+    def predict(self, drive: ArrayLike, output: ArrayLike) -> Array:
+        """One-step prediction ``(N,)`` from measured outputs."""
+
+    def poles(self) -> tuple[Pole, ...]:
+        """Poles, slowest first."""

@@ -1,0 +1,5 @@
+"""Validation of identified models: residual tests, and errors over drives that were not fitted."""
+
+from .rmse_grid import SHAPES, Grid, periodic, records_rmse, rmse_grid
+
+__all__ = ["SHAPES", "Grid", "periodic", "records_rmse", "rmse_grid"]
