@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import metrics
-from .arx import ArxModel, ArxOrder, IdentificationError, fit_arx
 from .decimation import trace
+from .linear_models import ArxModel, ArxOrder, IdentificationError, fit_arx
 from .noise import noise_floor
 from .records import Record
 from .resampling import held_average, sampled
@@ -189,8 +189,8 @@ def _model_document(model: ArxModel) -> dict[str, Any]:
         "transfer_function": {"numerator": numerator, "denominator": denominator, "sampling_time": model.dt},
         "poles": [
             {
-                "real": p.z.real,
-                "imaginary": p.z.imag,
+                "real": p.value.real,
+                "imaginary": p.value.imag,
                 "natural_frequency_hz": p.natural_frequency,
                 "damping": p.damping,
                 "stable": p.stable,
@@ -206,10 +206,10 @@ def _verdict(settings: Settings, model: ArxModel, validation: Sequence[dict[str,
     name = f"ARX({order.na}, {order.nb}, {order.nk}) at {settings.sampling_time * 1e3:g} ms"
     fits = [p["best_fit_free_run"] for p in validation]
     one_step = np.mean([p["best_fit_one_step"] for p in validation])
-    outside = [p for p in model.poles() if abs(p.z) > _UNSTABLE]
+    outside = [p for p in model.poles() if abs(p.value) > _UNSTABLE]
     if outside or not np.isfinite(fits).all():
         text = (
-            f"{name} is unstable (pole at |z| = {max(abs(p.z) for p in outside):.3g}): its free run says "
+            f"{name} is unstable (pole at |z| = {max(abs(p.value) for p in outside):.3g}): its free run says "
             f"nothing, one step ahead it fits held-out data to {one_step:.1f} %. Try another sampling time or "
             "order, or a richer drive."
         )

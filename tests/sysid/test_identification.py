@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hydraulic_sysid.arx import ArxOrder, IdentificationError
+from hydraulic_sysid.linear_models import ArxOrder, IdentificationError
 from hydraulic_sysid.identification import Settings, identify
 from hydraulic_sysid.records import Record
 

@@ -15,18 +15,19 @@ Array = NDArray[np.float64]
 LONGEST = 12
 
 
+def autoregression(errors: Sequence[Array], order: int) -> Array:
+    """Coefficients ``(order,)`` d₁ … of the autoregression of the experiments' errors ``(N_i,)``."""
+    d, *_ = np.linalg.lstsq(*_regression(errors, order), rcond=None)
+    return np.asarray(d, dtype=float)
+
+
 def fit_noise(errors: Sequence[Array], longest: int = LONGEST) -> tuple[Array, float]:
     """Coefficients ``(k,)`` d₁ … d_k, 0 ≤ k ≤ ``longest``, and the mean squared prediction error that they leave.
 
     ``errors`` are the simulation errors ``(N_i,)`` of the experiments. All orders are compared on the same samples.
     """
     longest = max(0, min(longest, (min(v.size for v in errors) - 1) // 10))
-    target = np.concatenate([v[longest:] for v in errors])
-    past = np.vstack(
-        [np.stack([-v[longest - k : v.size - k] for k in range(1, longest + 1)], axis=1) for v in errors]
-        if longest
-        else [np.empty((v.size, 0)) for v in errors]
-    )
+    past, target = _regression(errors, longest)
     best, least, loss = np.empty(0), np.inf, float(np.mean(target**2))
     if loss == 0.0:
         return best, 0.0
@@ -37,3 +38,12 @@ def fit_noise(errors: Sequence[Array], longest: int = LONGEST) -> tuple[Array, f
         if criterion < least:
             best, least, loss = d, criterion, left
     return best, loss
+
+
+def _regression(errors: Sequence[Array], order: int) -> tuple[Array, Array]:
+    """Past values with the sign of the equation (M, order), and the values themselves (M,)."""
+    past = [
+        np.stack([-v[order - k : v.size - k] for k in range(1, order + 1)], axis=1) if order else np.empty((v.size, 0))
+        for v in errors
+    ]
+    return np.vstack(past), np.concatenate([v[order:] for v in errors])

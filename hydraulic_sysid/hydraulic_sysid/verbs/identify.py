@@ -15,8 +15,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from hydraulic_sysid import arx, cli, identification, results
+from hydraulic_sysid import cli, identification, results
 from hydraulic_sysid.display import SHOWN, number
+from hydraulic_sysid.linear_models import OFFSETS, ArxOrder, IdentificationError
 from hydraulic_sysid.records import read_all
 
 from .compare import add_folder_options, add_window_option, read_window, summary_json
@@ -45,18 +46,18 @@ def main(argv: list[str] | None = None) -> int:
     )
     held.add_argument("--holdout-record", metavar="PATH", type=cli.Path, nargs="+", help="records to hold out instead")
     parser.add_argument(
-        "--offsets", choices=arx.OFFSETS, default="estimate", help="constant offsets (default: estimate them)"
+        "--offsets", choices=OFFSETS, default="estimate", help="constant offsets (default: estimate them)"
     )
     parser.add_argument("--input", metavar="CHANNEL", default="drive", help="input channel (default drive)")
     parser.add_argument("--output", metavar="CHANNEL", default="position", help="output channel (default position)")
     add_folder_options(parser)
-    return cli.run(parser, _identify, argv, errors=(arx.IdentificationError, results.ResultError))
+    return cli.run(parser, _identify, argv, errors=(IdentificationError, results.ResultError))
 
 
 def _identify(options: argparse.Namespace) -> int:
     results.check_target(options.out, "identify")
     settings = identification.Settings(
-        order=arx.ArxOrder(*options.order),
+        order=ArxOrder(*options.order),
         sampling_time=options.sampling_time,
         holdout=options.holdout,
         offsets=options.offsets,

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from hydraulic_sim.model import Model
-from hydraulic_sysid import arx, identification, results
+from hydraulic_sysid import identification, results
 from hydraulic_sysid.compare import ComparisonError, Settings, compare
+from hydraulic_sysid.linear_models import IdentificationError
 from hydraulic_sysid.records import Record, RecordError, TimeError, read_records
 from hydraulic_sysid.report import write_page
 
@@ -68,7 +69,7 @@ def analyse(records: list[Record], held_out: list[Record], model: Model, out: Pa
         settings = identification.Settings(sampling_time=sampling)
         identified = identification.identify(records, held_out or None, settings)
         results.write_result(out, identified)
-    except arx.IdentificationError as error:
+    except IdentificationError as error:
         left_out = f"not identified: {error}"
     steps.done()
     every = [*records, *held_out]

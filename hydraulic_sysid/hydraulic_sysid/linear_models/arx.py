@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import lfilter
 
+from .errors import IdentificationError
+from .poles import Pole, sampled_poles
+from .series import experiments, lengths_agree
+from .tall import solve
+
 Array = NDArray[np.float64]
 _OVERFLOW = 1e8
-OFFSETS = ("estimate", "remove", "none")
-
-
-class IdentificationError(ValueError):
-    """The data cannot give the model that was asked for (too short, input not moving, wrong order)."""
 
 
 @dataclass(frozen=True)
@@ -49,21 +49,10 @@ class ArxOrder:
         """Length of the filter state that the past leaves behind."""
         return max(self.na, self.nb + self.nk - 1, 1)
 
-
-@dataclass(frozen=True)
-class Pole:
-    """One pole of a sampled model with what it means in continuous time (s = ln(z)/T)."""
-
-    z: complex
-    natural_frequency: float
-    """|s|/(2π) in Hz."""
-    damping: float
-    """−Re(s)/|s|; 1 for a real stable pole, 0 for an undamped one or a pure integrator."""
-
     @property
-    def stable(self) -> bool:
-        """True strictly inside the unit circle."""
-        return abs(self.z) < 1.0
+    def text(self) -> str:
+        """The usual name: ``ARX(3, 3, 1)``."""
+        return f"ARX({self.na}, {self.nb}, {self.nk})"
 
 
 @dataclass(frozen=True)
@@ -88,11 +77,25 @@ class ArxModel:
     samples: int
     condition_number: float
     """Of the regression matrix with columns scaled to unit length."""
+    method: str = "least squares"
 
     @property
     def parameters(self) -> int:
         """How many values were estimated."""
         return self.standard_errors.size
+
+    @property
+    def memory(self) -> int:
+        """Samples of the past that one prediction needs."""
+        return self.order.memory
+
+    def coefficients(self) -> list[tuple[str, float, float]]:
+        """Name, value and standard error of every estimated coefficient."""
+        names = [f"a{i + 1}" for i in range(self.order.na)] + [f"b{i + 1}" for i in range(self.order.nb)]
+        values = [*self.a, *self.b]
+        if self.standard_errors.size > len(values):
+            names, values = [*names, "c"], [*values, self.constant]
+        return [(n, float(v), float(e)) for n, v, e in zip(names, values, self.standard_errors, strict=True)]
 
     def transfer_function(self) -> tuple[Array, Array]:
         """Numerator and denominator in descending powers of z, for ``control.TransferFunction(num, den, dt)``."""
@@ -105,18 +108,12 @@ class ArxModel:
 
     def poles(self) -> tuple[Pole, ...]:
         """Poles, slowest first."""
-        poles = []
-        for z in np.roots(np.concatenate(([1.0], self.a))):
-            s = np.log(complex(z)) / self.dt if z != 0.0 else complex(-np.inf)
-            size = abs(s)
-            damping = float(-s.real / size) if 0.0 < size < np.inf else (1.0 if size else 0.0)
-            poles.append(Pole(complex(z), float(size / (2.0 * np.pi)), damping))
-        return tuple(sorted(poles, key=lambda p: (p.natural_frequency, p.z.imag)))
+        return sampled_poles(np.concatenate(([1.0], self.a)), self.dt)
 
     def predict(self, drive: ArrayLike, output: ArrayLike) -> Array:
         """One-step prediction ``(N,)`` of the output; the first ``order.memory`` values are NaN (no past)."""
-        u, y = _same_length(drive, output)
-        past = _regressors(u - self.input_offset, y - self.output_offset, self.order)
+        u, y = lengths_agree(drive, output)
+        past = np.column_stack(regressors(u - self.input_offset, y - self.output_offset, self.order))
         theta = np.concatenate((self.a, self.b))
         head = np.full(self.order.memory, np.nan)
         return np.concatenate((head, past @ theta + self.constant + self.output_offset))
@@ -135,7 +132,7 @@ class ArxModel:
         forced = forced + self.output_offset
         if output is None:
             return forced
-        _, y = _same_length(drive, output)
+        _, y = lengths_agree(drive, output)
         if not np.isfinite(forced).all() or np.abs(forced).max() > _OVERFLOW:
             return np.full(u.size, np.nan)
         size = self.order.state_size
@@ -157,71 +154,48 @@ def fit_arx(
 
     :raises IdentificationError: too few samples, unequal lengths, or an input that does not excite the order.
     """
-    if offsets not in OFFSETS:
-        raise IdentificationError(f"offsets: {offsets!r} is none of {', '.join(OFFSETS)}")
-    pairs = [_same_length(u, y) for u, y in zip(drives, outputs, strict=True)]
-    if not pairs:
-        raise IdentificationError("an ARX model needs at least one experiment")
-    u0 = float(np.mean(np.concatenate([u for u, _ in pairs]))) if offsets == "remove" else 0.0
-    y0 = float(np.mean(np.concatenate([y for _, y in pairs]))) if offsets == "remove" else 0.0
-    past = np.vstack([_regressors(u - u0, y - y0, order) for u, y in pairs])
-    target = np.concatenate([(y - y0)[order.memory :] for _, y in pairs])
-    if offsets == "estimate":
-        past = np.column_stack((past, np.ones(len(past))))
-    count = past.shape[1]
-    if len(target) <= 2 * count:
-        raise IdentificationError(
-            f"{len(target)} usable samples at {dt:g} s are too few for {count} parameters: "
-            "take a longer record, a shorter sampling time or a lower order"
-        )
-    theta, covariance, condition = _least_squares(past, target)
-    loss = float(np.mean((target - past @ theta) ** 2))
-    na, nb = order.na, order.nb
+    pairs, u0, y0 = experiments(drives, outputs, offsets)
+    chunks = [[*regressors(u, y, order, offsets == "estimate"), y[order.memory :]] for u, y in pairs]
+    count = order.na + order.nb + int(offsets == "estimate")
+    enough(sum(chunk[-1].size for chunk in chunks), count, dt)
+    found = solve(chunks)
+    variance = found.squares / (found.rows - count)
     return ArxModel(
         order=order,
         dt=dt,
-        a=theta[:na],
-        b=theta[na : na + nb],
-        constant=float(theta[-1]) if offsets == "estimate" else 0.0,
+        a=found.theta[: order.na],
+        b=found.theta[order.na : order.na + order.nb],
+        constant=float(found.theta[-1]) if offsets == "estimate" else 0.0,
         input_offset=u0,
         output_offset=y0,
-        standard_errors=np.sqrt(loss * len(target) / (len(target) - count) * np.diag(covariance)),
-        loss=loss,
-        samples=len(target),
-        condition_number=condition,
+        standard_errors=np.sqrt(variance * np.diag(found.covariance)),
+        loss=found.squares / found.rows,
+        samples=found.rows,
+        condition_number=found.condition,
     )
 
 
-def _least_squares(past: Array, target: Array) -> tuple[Array, Array, float]:
-    """Parameters, (ΦᵀΦ)⁻¹ and condition number, with columns scaled: volts stand beside metres."""
-    lengths = np.linalg.norm(past, axis=0)
-    if not lengths.all():
-        raise IdentificationError("the drive or the position is zero throughout: nothing can be identified")
-    left, singular, right = np.linalg.svd(past / lengths, full_matrices=False)
-    condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else np.inf
-    if condition > 1e12:
-        raise IdentificationError(
-            f"the record does not excite a model of this order (condition number {condition:.1e}): "
-            "lower the order or use a richer drive"
-        )
-    theta = (right.T @ ((left.T @ target) / singular)) / lengths
-    scaled = right.T / singular
-    covariance = (scaled @ scaled.T) / np.outer(lengths, lengths)
-    return theta, covariance, condition
+def regressors(u: Array, y: Array, order: ArxOrder, constant: bool = False) -> list[Array]:
+    """Columns −y(t−1) … −y(t−na), u(t−nk) … u(t−nk−nb+1) [, 1] for t = memory … N−1.
 
-
-def _regressors(u: Array, y: Array, order: ArxOrder) -> Array:
-    """Rows [−y(t−1) … −y(t−na), u(t−nk) … u(t−nk−nb+1)] for t = memory … N−1."""
+    :raises IdentificationError: fewer samples than the model looks back.
+    """
     first, n = order.memory, y.size
     if n <= first:
         raise IdentificationError(f"{n} samples are too few for a model that looks {first} samples back")
-    outputs = [-y[first - i : n - i] for i in range(1, order.na + 1)]
-    inputs = [u[first - i : n - i] for i in range(order.nk, order.nk + order.nb)]
-    return np.column_stack(outputs + inputs)
+    negative = -y
+    columns = [negative[first - i : n - i] for i in range(1, order.na + 1)]
+    columns += [u[first - i : n - i] for i in range(order.nk, order.nk + order.nb)]
+    return [*columns, np.ones(n - first)] if constant else columns
 
 
-def _same_length(drive: ArrayLike, output: ArrayLike) -> tuple[Array, Array]:
-    u, y = np.asarray(drive, dtype=float), np.asarray(output, dtype=float)
-    if u.shape != y.shape or u.ndim != 1:
-        raise IdentificationError(f"drive {u.shape} and output {y.shape} must be equal and one-dimensional")
-    return u, y
+def enough(samples: int, count: int, dt: float) -> None:
+    """Refuse fewer than two samples for each parameter.
+
+    :raises IdentificationError: there are fewer.
+    """
+    if samples <= 2 * count:
+        raise IdentificationError(
+            f"{samples} usable samples at {dt:g} s are too few for {count} parameters: "
+            "take a longer record, a shorter sampling time or a lower order"
+        )

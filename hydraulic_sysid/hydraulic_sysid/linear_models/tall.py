@@ -1,0 +1,85 @@
+"""Least squares with many rows and few columns, by QR of blocks that fit into the processor's cache.
+
+The R factors of the blocks are stacked and factored again until one is left (tall-skinny QR, [1]): as accurate as
+Householder's QR of the whole matrix, about as fast as forming the normal equations, which square the condition
+number, and without the whole matrix in memory.
+
+[1] J. Demmel, L. Grigori, M. Hoemmen, J. Langou, *SIAM J. Sci. Comput.* 34 (2012) A206–A239.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import IdentificationError
+
+Array = NDArray[np.float64]
+_BLOCK = 1024
+_CHUNK = 64 * _BLOCK
+_WORST = 1e12
+
+
+@dataclass(frozen=True)
+class Solution:
+    """``theta`` (k,), ``covariance`` (ΦᵀΦ)⁻¹, condition number of Φ with columns of unit length, Σe² and rows."""
+
+    theta: Array
+    covariance: Array
+    condition: float
+    squares: float
+    rows: int
+
+
+def triangle(chunks: Iterable[Sequence[Array]]) -> tuple[Array, int]:
+    """R (k, k) with RᵀR = Σ MᵀM and the number of rows, for chunks M given as their k columns of equal length."""
+    found: list[Array] = []
+    rows = 0
+    for columns in chunks:
+        length = columns[0].size
+        rows += length
+        for first in range(0, length, _CHUNK):
+            part = np.stack([c[first : first + _CHUNK] for c in columns])
+            found.append(_reduced(part))
+    stacked = np.vstack(found)
+    while len(stacked) > _CHUNK:
+        stacked = _reduced(np.ascontiguousarray(stacked.T))
+    return np.linalg.qr(stacked, mode="r"), rows
+
+
+def _reduced(part: Array) -> Array:
+    """R factors, one under the other, of the blocks of a matrix given as its rows ``(k, n)`` of columns."""
+    k, n = part.shape
+    whole = n // _BLOCK * _BLOCK
+    blocks = part[:, :whole].reshape(k, -1, _BLOCK).transpose(1, 2, 0)
+    rest = part[:, whole:].T
+    if not whole:
+        return rest
+    return np.vstack((np.linalg.qr(blocks, mode="r").reshape(-1, k), rest))
+
+
+def solve(chunks: Iterable[Sequence[Array]]) -> Solution:
+    """Least squares of the last column on the others.
+
+    :raises IdentificationError: a column is zero throughout, or the columns are as good as dependent.
+    """
+    r, rows = triangle(chunks)
+    k = r.shape[1] - 1
+    if len(r) <= k:  # as many rows as unknowns: nothing is left over
+        r = np.vstack((r, np.zeros((k + 1 - len(r), k + 1))))
+    lengths = np.linalg.norm(r[:, :k], axis=0)
+    if not lengths.all():
+        raise IdentificationError("the drive or the output is zero throughout: nothing can be identified")
+    left, singular, right = np.linalg.svd(r[:k, :k] / lengths)
+    condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
+    if condition > _WORST:
+        raise IdentificationError(
+            f"the record does not excite a model of this order (condition number {condition:.1e}): "
+            "lower the order or use a richer drive"
+        )
+    theta = (right.T @ ((left.T @ r[:k, k]) / singular)) / lengths
+    scaled = right.T / singular
+    return Solution(theta, (scaled @ scaled.T) / np.outer(lengths, lengths), condition, float(r[k, k] ** 2), rows)
