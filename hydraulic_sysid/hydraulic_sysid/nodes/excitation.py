@@ -1,7 +1,8 @@
 """Node `/actuator/excitation`: plays an excitation plan, one command for every state of the plant.
 
 A command carries the stamp of the state it answers, so that the plant sees the whole delay of the loop in it.
-The topic `experiment` tells what is played, how it ended and why; `~/start` and `~/abort` are the switches.
+The topic `experiment` tells what is played, how it ended and why; `~/start` and `~/abort` are the switches, and
+`~/measure_bandwidth` plays a probe and tells the bandwidth.
 """
 
 from __future__ import annotations
@@ -19,14 +20,16 @@ from std_srvs.srv import Trigger
 from hydraulic_interfaces.contract import EXCITATION_NODE, NAMESPACE
 from hydraulic_interfaces.conversions import CommandEncoder, MessageError, sample_from_messages
 from hydraulic_interfaces.nodes.parameters import ParameterTable
+from hydraulic_interfaces.nodes.serving import ServedNode, serve
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.qos import profile
 from hydraulic_sysid.excitation import ExcitationError, Phase, Plan, Session, load_plan, shipped_plans
+from hydraulic_sysid.nodes._bandwidth_probe import BandwidthProbe
 from hydraulic_sysid.nodes._excitation_health import health
-from hydraulic_sysid.nodes._serving import ServedNode, serve
 
 PARAMETERS = (
     ParameterSpec("plan", "chirp", f"plan file, or one of {', '.join(shipped_plans())}", live=True),
+    ParameterSpec("probe", "probe", "plan that measure_bandwidth plays: file or name", live=True),
     ParameterSpec("autostart", False, "start as soon as the plant is enabled and its state flows"),
     ParameterSpec("exit_when_done", False, "leave after the run: exit code 0 finished, 1 aborted", live=True),
     ParameterSpec("start_timeout", 0.0, "autostart waits no longer; 0: for ever", "s", 0.0, 3600.0),
@@ -59,6 +62,7 @@ class ExcitationNode(ServedNode):
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, profile("diagnostics"))
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/abort", self._on_abort)
+        self._probe = BandwidthProbe(self, lambda: self._table["probe"], self._begin)
 
     def watch(self) -> None:
         """What must happen without a message: notice silence, give up waiting, report health, leave."""
@@ -98,6 +102,8 @@ class ExcitationNode(ServedNode):
 
     def _tell(self, event: str) -> None:
         self._experiment.publish(String(data=event))
+        if self._session.ended:
+            self._probe.end(self._session.ended is Phase.FINISHED, self._session.last_end)
         self.get_logger().info(self._session.last_end if self._session.ended else "started")
 
     def _on_state(self, message: JointState) -> None:
@@ -107,6 +113,8 @@ class ExcitationNode(ServedNode):
             self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
             return
         drive = self._session.answer(sample, time.monotonic())
+        if self._session.run is not None:
+            self._probe.take(sample)
         if drive is not None:
             self._command.publish(self._encode(sample.stamp_ns, drive))
 
@@ -115,20 +123,23 @@ class ExcitationNode(ServedNode):
             values = {pair.key: pair.value for pair in row.values}
             self._session.diagnose(row.name, row.level == DiagnosticStatus.OK, row.message, values)
 
-    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _begin(self, plan: Plan) -> str:
+        """Arm `plan` to start with the next state; empty, or why not."""
         if self._session.busy:
-            response.message = "refused: a run is on, or waits to start"
-            return response
+            return "a run is on, or waits to start"
         obstacle = self._session.obstacle(time.monotonic())
+        if not obstacle:
+            self._arm(plan, math.inf)
+        return obstacle
+
+    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
             plan = load_plan(self._table["plan"])
+            refused = self._begin(plan)
         except ExcitationError as error:
-            obstacle = str(error)
-        if obstacle:
-            response.message = f"refused: {obstacle}"
-        else:
-            self._arm(plan, math.inf)
-            response.success, response.message = True, f"starting {plan.name}, {plan.total_time:g} s"
+            refused = str(error)
+        response.success = not refused
+        response.message = f"refused: {refused}" if refused else f"starting {plan.name}, {plan.total_time:g} s"
         return response
 
     def _on_abort(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -6,6 +6,7 @@ import gc
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -19,8 +20,8 @@ from hydraulic_interfaces.parameter_spec import ParameterSpec
 WATCH_PERIOD_S = 0.05
 
 
-class ServedNode(Node):
-    """A node that `serve` runs; it is left with `exit_code` when it sets `over`."""
+class Served:
+    """What `serve` asks of a node, plain or managed; it is left with `exit_code` when it sets `over`."""
 
     over = False
     exit_code = 0
@@ -36,13 +37,17 @@ class ServedNode(Node):
         """Called last, while publishers still work."""
 
 
+class ServedNode(Served, Node):
+    """A plain node that `serve` runs."""
+
+
 def serve(
-    make_node: Callable[[], ServedNode],
+    make_node: Callable[[], Any],
     description: str,
     parameters: Sequence[ParameterSpec],
     argv: list[str] | None,
 ) -> int:
-    """Run the node until it is over; its exit code, or 2 for what it refuses when it is made."""
+    """Run the node (`Served`) until it is over; its exit code, or 2 for what it refuses when it is made."""
     command_line.start(command_line.parser(description, parameters), argv)
     try:
         node = make_node()
