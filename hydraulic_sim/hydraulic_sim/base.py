@@ -9,11 +9,19 @@ friction and takes a force proportional to the drive.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from .effect import Parameter, State
 
 MERRITT = "Merritt (1967), Hydraulic Control Systems"
 DATASHEET = "data sheet of the actuator or valve"
+DAHL = "Dahl (1968); Armstrong-Helouvry et al. (1994), Automatica 30(7)"
+
+# Dry friction turns its direction within this sliding distance and with this damping time, unless a model says
+# otherwise: far below what a sensor of such an axis resolves, and a true stick (no creep) at rest. Damping as in
+# Canudas de Wit et al. (1995), IEEE Trans. Automatic Control 40(3).
+BRISTLE_LENGTH = 5e-6
+BRISTLE_TIME = 2e-3
 
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter("moving_mass", "kg", 500.0, (1e-3, 1e6), "piston, rod and rigid load", DATASHEET, required=True),
@@ -42,13 +50,18 @@ PARAMETERS: tuple[Parameter, ...] = (
               free=False),
     Parameter("spool_travel", "m", 5e-4, (1e-6, 0.1), "spool displacement at full opening (reported, not felt)",
               DATASHEET, free=False),
-    Parameter("orifice_transition", "Pa", 1e4, (1.0, 1e6), "drop below which orifice flow turns laminar",
-              MERRITT + ", ch. 3", free=False),
+    Parameter("orifice_transition", "Pa", 1e4, (100.0, 1e6), "drop below which orifice flow turns laminar",
+              MERRITT + ", ch. 3", free=False, nuisance=True),
+    Parameter("bristle_length", "m", BRISTLE_LENGTH, (BRISTLE_LENGTH, 5e-5),
+              "sliding distance over which dry friction turns", DAHL + ": 2 to 50 um for metals", free=False,
+              nuisance=True),
+    Parameter("bristle_time", "s", BRISTLE_TIME, (0.0, 5e-3), "damping of the bristles over their stiffness", DAHL,
+              free=False, nuisance=True),
     Parameter("drive_force", "N/V", 0.0, (-1e6, 1e6), "force per volt of a mechanical plant (without hydraulics)",
               "motor and amplifier data sheets", free=False),
 )  # fmt: skip
 
-MECHANICAL = ("moving_mass", "stroke", "drive_limit", "drive_force")
+MECHANICAL = ("moving_mass", "stroke", "drive_limit", "drive_force", "bristle_length", "bristle_time")
 """The base parameters that a mechanical plant has."""
 
 # Rate states first, relaxation states last; effects add theirs behind each group.
@@ -60,17 +73,14 @@ STATES: tuple[State, ...] = (
     State("stick", "1", kind="relaxation"),
 )
 
-# Dry friction turns its direction within this sliding distance and with this damping time, unless an effect says
-# otherwise: far below what a sensor of such an axis resolves, and a true stick (no creep) at rest. Dahl (1968);
-# damping as in Canudas de Wit et al. (1995), IEEE Trans. Automatic Control 40(3).
-BRISTLE_LENGTH = 5e-6
-BRISTLE_TIME = 2e-3
 
+def dry_friction_rate(level: float, p: Mapping[str, float]) -> float:
+    """The fastest rate [1/s] of the mass on bristles that carry a friction force [N]; ``p``: base parameters.
 
-def dry_friction_rate(level: float, mass: float) -> float:
-    """The fastest rate [1/s] of a mass [kg] on bristles that carry a friction force [N]."""
-    stiffness = abs(level) / (BRISTLE_LENGTH * mass)
-    return max(math.sqrt(stiffness), stiffness * BRISTLE_TIME)
+    A fit may try values out of bounds: their size counts.
+    """
+    stiffness = abs(level / (p["bristle_length"] * p["moving_mass"]))
+    return max(math.sqrt(stiffness), stiffness * abs(p["bristle_time"]))
 
 
 OUTPUTS = (

@@ -32,7 +32,7 @@ CACHE_VARIABLE = "HYDRAULIC_SIM_CACHE"
 
 
 class CompiledPlant:
-    """The compiled functions of one library (`rhs`, `run`, `run_many`) and the layout of their arrays."""
+    """The compiled functions of one library (`rhs`, `run`, `run_many`, `track`) and the layout of their arrays."""
 
     def __init__(self, library: Library) -> None:
         self.layout = Layout(library)
@@ -40,6 +40,7 @@ class CompiledPlant:
         self.rhs: Callable = self.module.rhs
         self.run: Callable = self.module.run
         self.run_many: Callable = self.module.run_many
+        self.track: Callable = self.module.track
 
 
 def cache_root() -> Path:

@@ -185,7 +185,7 @@ def write_module(library: Library) -> str:
     shared = {name: w.slot(name) for name in slots.SLOTS}
     rhs = _fill(
         RHS, **shared, stick=stick, stick_r=stick - layout.n_rates, dynamics=w.dynamics(),
-        bristle_length=base.BRISTLE_LENGTH, bristle_time=base.BRISTLE_TIME,
+        bristle_length=w.parameter("bristle_length"), bristle_time=w.parameter("bristle_time"),
     )  # fmt: skip
     functions = "\n".join(
         f'{e.name}__{which} = njit(FUNCTIONS["{e.name}.{which}"], error_model="numpy")'

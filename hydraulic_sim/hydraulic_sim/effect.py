@@ -30,7 +30,8 @@ class Parameter:
 
     ``null`` is the value at which the effect contributes exactly nothing; ``None`` marks a shape parameter, which
     has no such value of its own. ``free`` says whether a fit may move it unless a model file says otherwise.
-    ``required`` marks a base parameter for which no default is sensible: a model file must give it.
+    ``required`` marks a base parameter for which no default is sensible: a model file must give it. ``nuisance``
+    marks one that only smooths a law where it has a corner: no data sheet tells it, a diagnosis fits it along.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Parameter:
     null: float | None = None
     free: bool = True
     required: bool = False
+    nuisance: bool = False
 
     def __post_init__(self) -> None:
         low, high = self.bounds

@@ -200,22 +200,45 @@ def prime(drive, dt, start, on, P, X, M):
             {command}
 
 
-@njit("i8(f8[::1], f8, f8, f8, i8[::1], i8, i8, f8[:, ::1], i8, u1[::1], f8[::1], u1, f8[:, :, ::1], f8[::1])",
+@njit("i8(f8[::1], f8, f8, f8, i8[::1], i8, i8, f8[:, ::1], f8[:, ::1], u1[::1], f8[::1], u1, f8[:, :, ::1], f8[::1])",
       cache=True, nogil=True, error_model="numpy")
-def run_many(drive, dt, max_step, max_turn, starts, count, past, states, n_memory, on, P, hydraulic, Y, failure):
+def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memories, on, P, hydraulic, Y, failure):
     """Runs ``count`` samples from each start, the memories primed over ``past`` samples. Returns the starts done."""
     X = np.empty(NX)
-    M = np.zeros(n_memory)
+    M = np.empty(memories.shape[1])
     for i in range(len(starts)):
         first = starts[i]
         before = max(first - past, 0)
         X[:] = states[i]
-        M[:] = 0.0
+        M[:] = memories[i]
         if past > 0:
             prime(drive[before:first], dt, before * dt, on, P, X, M)
         ahead = drive[first:first + count]
         done = run(ahead, dt, first * dt, max_step, max_turn, on, P, hydraulic, X, M, Y[i], failure)
         if done < count:
             return i
+    return len(starts)
+
+
+@njit("i8(f8[::1], f8, f8, f8, f8[:, ::1], i8, i8[::1], u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1],"
+      " f8[:, ::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
+def track(drive, dt, max_step, max_turn, seen, every, starts, on, P, hydraulic, X, M, states, memories, failure):
+    """Runs along ``drive``, led every so many samples by what is seen of the first states; keeps X and M at starts."""
+    Y = np.empty((every, 10))
+    k = 0
+    for i in range(len(starts)):
+        while True:
+            for j in range(seen.shape[1]):
+                if seen[k, j] == seen[k, j]:
+                    X[j] = seen[k, j]
+            if k == starts[i]:
+                break
+            ahead = drive[k:min(k + every, starts[i])]
+            done = run(ahead, dt, k * dt, max_step, max_turn, on, P, hydraulic, X, M, Y, failure)
+            if done < len(ahead):
+                return i
+            k += len(ahead)
+        states[i] = X
+        memories[i] = M
     return len(starts)
 '''

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from . import base, slots
-from .effect import Parameter, check_value
+from .effect import Parameter, arguments, check_value
 from .errors import EffectError, ModelError
 from .registry import Library, library
 
@@ -90,6 +90,19 @@ class Model:
     def free_keys(self) -> tuple[str, ...]:
         """The parameters that a fit may move."""
         return tuple(key for key in self.keys() if self.entry(key).free)
+
+    def nuisance_keys(self) -> tuple[str, ...]:
+        """Parameters that only smooth the corner of a law which is on, unless the model calls them fixed."""
+        laws = [self._effect(name) for name in self.effects]
+        dry = any("direction" in arguments(f) for e in laws for f in e.functions().values())
+        bristles = dry and not any(e.slot == "bristle" for e in laws)
+        return tuple(
+            key
+            for key in self.keys()
+            if self.parameter(key).nuisance
+            and (bristles or not key.startswith("bristle_"))
+            and not (key in self.entries and self.entries[key].free is not None)
+        )
 
     def with_values(self, values: Mapping[str, float], *, source: str | None = None) -> Model:
         """A copy with other values [SI]. A value that changes takes ``source``, and loses the standard error.

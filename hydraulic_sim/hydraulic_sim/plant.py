@@ -21,6 +21,7 @@ LONGEST_MEMORY = 256  # samples of past drive that effects on the command may ne
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
 MOST_HALVINGS = 6
+LED_EVERY = 4  # samples after which a tracked plant is set to what was seen
 
 
 class Plant:
@@ -146,13 +147,20 @@ class Plant:
         )
 
     def predict(
-        self, drive: ArrayLike, dt: float, starts: ArrayLike, horizon: int, initial_states: ArrayLike
+        self,
+        drive: ArrayLike,
+        dt: float,
+        starts: ArrayLike,
+        horizon: int,
+        initial_states: ArrayLike,
+        memories: Array | None = None,
     ) -> dict[str, Array]:
         """Many short runs over one drive, each from a state of its own.
 
         ``starts`` (S,) sample indices into ``drive`` (N,); ``horizon`` samples ahead, ``starts + horizon`` < N;
         ``initial_states`` (S, n_states). Returns channel → (S, horizon + 1), column 0 being the start itself.
-        Effects on the command remember the drive before each start. Raises `SimulationError` as `simulate` does.
+        Effects on the command remember the drive before each start, or begin with ``memories`` (S, n_memory) as
+        `track` gives them. Raises `SimulationError` as `simulate` does.
         """
         u = np.require(drive, np.float64, ("C", "W"))  # records are read-only, which compiled code does not take
         first = np.require(starts, np.int64, ("C", "W"))
@@ -168,17 +176,56 @@ class Plant:
         self._check_dt(dt)
         out = np.empty((len(first), horizon + 1, len(base.OUTPUTS)))
         failure = np.zeros(2)
-        past = LONGEST_MEMORY if self._remembers else 0
+        past = LONGEST_MEMORY if self._remembers and memories is None else 0
+        if memories is None:
+            memories = np.zeros((len(first), self.layout.n_memory))
         turn = rates.STEP_TIMES_LANDS * self.refinement
         done = self._compiled.run_many(
-            u, dt, self.longest_step, turn, first, horizon + 1, past, states, self.layout.n_memory, self._on,
-            self._parameters, self._hydraulic, out, failure,
+            u, dt, self.longest_step, turn, first, horizon + 1, past, states, memories, self._on, self._parameters,
+            self._hydraulic, out, failure,
         )  # fmt: skip
         if done < len(first):
             start = int(first[done])
             into = min(max(int((failure[0] - start * dt) / dt + 1e-6), 0), horizon)
             raise self._failed(failure, start + into, u, out[done, into], f"the run from sample {start} failed")
         return {name: out[:, :, i] for i, name in enumerate(base.OUTPUTS)}
+
+    @property
+    def has_inner_states(self) -> bool:
+        """Whether an effect that is on has states of its own, which no sensor sees."""
+        return any(effect.states for effect in self._active)
+
+    def track(self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike) -> tuple[Array, Array]:
+        """What the states that no sensor sees have become at each start, the others led by what was seen.
+
+        ``drive`` (N,) [V]; ``starts`` (S,) rising sample indices; ``seen`` (N, 4): position, velocity, pressures of
+        A and B as measured, NaN where they were not. Returns the states (S, n_states) and memories (S, n_memory);
+        those of the position's sensor begin anew, as what was seen has passed it. Raises `SimulationError`.
+        """
+        u = np.require(drive, np.float64, ("C", "W"))
+        first = np.require(starts, np.int64, ("C", "W"))
+        led = np.require(seen, np.float64, ("C", "W"))
+        if led.shape != (len(u), 4):
+            raise SimulationError(f"what was seen has the shape {led.shape}; expected {(len(u), 4)}")
+        if len(first) and (first[0] < 0 or first[-1] >= len(u) or np.any(np.diff(first) < 0)):
+            raise SimulationError(f"the starts must rise within 0…{len(u) - 1}")
+        self._check_dt(dt)
+        begin = self.initial_state(drive=float(u[0]))
+        x, memory, failure = begin.states.copy(), begin.memory.copy(), np.zeros(2)
+        states, memories = np.empty((len(first), x.size)), np.empty((len(first), memory.size))
+        turn = rates.STEP_TIMES_LANDS * self.refinement
+        done = self._compiled.track(
+            u, dt, self.longest_step, turn, led, LED_EVERY, first, self._on, self._parameters, self._hydraulic, x,
+            memory, states, memories, failure,
+        )  # fmt: skip
+        if done < len(first):
+            sample = min(max(int(failure[0] / dt + 1e-6), 0), len(u) - 1)
+            where = ", ".join(f"{name}={value:.6g}" for name, value in zip(self.layout.states, x, strict=True))
+            raise SimulationError(f"the plant led along its record failed at sample {sample}; state reached: {where}")
+        for name, place in self.layout.memories.items():
+            if self.layout.library[name].slot.endswith("_sensor"):
+                memories[:, place] = 0.0
+        return states, memories
 
     def _check_state(self, state: PlantState) -> None:
         """Compiled code trusts the lengths; those of another library's state differ."""

@@ -559,8 +559,26 @@ def coast(plant: Plant, v: float = 0.2, n: int = 300) -> Any:
 
 @pytest.mark.parametrize("tau", [2e-4, 5e-3, 0.05])
 def test_a_lagging_sensor_trails_a_ramp_by_slope_times_lag(free: Build, tau: float) -> None:
-    run = coast(free(sensor_lag={"time": tau}))
-    assert run.position == pytest.approx(run.true_position - 0.2 * tau * (1.0 - np.exp(-run.time / tau)), abs=1e-14)
+    run = coast(free(sensor_lag={"time": tau}))  # which begins as if it had always moved like this
+    assert run.position == pytest.approx(run.true_position - 0.2 * tau, abs=1e-13)
+
+
+@pytest.mark.parametrize("tau", [2e-4, 5e-3, 0.05])
+def test_a_lagging_sensor_closes_in_exponentially_on_a_stop(free: Build, tau: float) -> None:
+    plant = free(sensor_lag={"time": tau})
+    kernel = plant.model.library["sensor_lag"].kernel
+    memory = np.zeros(3)
+    kernel(0.0, memory, DT, 0.0, tau)
+    risen = np.array([kernel(1e-3 * min(k, 1), memory, DT, 0.0, tau) for k in range(1, 40)])
+    ramp = 1e-3 - 1e-3 * tau / DT * (1.0 - np.exp(-DT / tau))  # one sample of ramp, then standing still
+    assert risen == pytest.approx(1e-3 - (1e-3 - ramp) * np.exp(-DT * np.arange(39) / tau), abs=1e-15)
+
+
+@pytest.mark.parametrize("effect", [{"sensor_delay": {"delay": 7e-3}}, {"sensor_backlash": {"half_gap": 1e-3}}])
+def test_a_sensor_begins_as_if_it_had_always_moved_like_this(free: Build, effect: Any) -> None:
+    behind = 0.2 * 7e-3 if "sensor_delay" in effect else 1e-3
+    run = coast(free(**effect))
+    assert run.position == pytest.approx(run.true_position - behind, abs=1e-13)
 
 
 def test_static_sensor_errors(free: Build) -> None:

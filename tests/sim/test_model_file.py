@@ -375,7 +375,8 @@ def test_a_mechanical_plant_needs_no_oil(write: Write) -> None:
     model = load_model(path)
     assert model.name == "bench"
     assert set(model.keys()) == {
-        "moving_mass", "stroke", "drive_limit", "drive_force", "viscous_friction.coefficient", "end_stop.stiffness",
+        "moving_mass", "stroke", "drive_limit", "drive_force", "bristle_length", "bristle_time",
+        "viscous_friction.coefficient", "end_stop.stiffness",
         "end_stop.damping",
     }  # fmt: skip
     path.write_text(path.read_text().replace("viscous_friction: {coefficient: 1 N*s/m}", "internal_leakage: {}"))

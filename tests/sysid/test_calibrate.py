@@ -96,7 +96,7 @@ def records(axis: list[dict[str, Array]]) -> list[Record]:
 
 def true_model() -> Model:
     """Sharp orifices, as in `slope`: the simulator's smoothing at 10 kPa would shift the valve's flow by 0.07 %."""
-    sharp = {**TRUTH, "orifice_transition": 10.0}
+    sharp = {**TRUTH, "orifice_transition": 100.0}
     bench = load_model("sample_bench").without_effect("coulomb_friction")
     for key in TRUTH:  # this axis is another than the bench, whose bounds are not its own
         bench = bench.with_entry(key, bounds=None)

@@ -36,5 +36,5 @@ EFFECT = Effect(
     excited_by="slow triangle through standstill: the load pressure builds up while the piston sticks",
     confused_with=("valve_deadband", "backlash"),
     told_apart_by="slow triangle: load pressure builds up while stuck",
-    step_rate=lambda p: dry_friction_rate(p["level"], p["moving_mass"]),
+    step_rate=lambda p: dry_friction_rate(p["level"], p),
 )

@@ -35,5 +35,5 @@ EFFECT = Effect(
     excited_by="reversals at several loads, with rests between",
     confused_with=("constant_load", "viscous_asymmetry", "valve_null_bias"),
     told_apart_by="reversal at several loads; vanishes at rest",
-    step_rate=lambda p: dry_friction_rate(p["difference"], p["moving_mass"]),
+    step_rate=lambda p: dry_friction_rate(p["difference"], p),
 )

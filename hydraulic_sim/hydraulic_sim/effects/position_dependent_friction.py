@@ -33,5 +33,5 @@ EFFECT = Effect(
     excited_by="the same speed at different positions",
     confused_with=("end_cushion", "load_spring", "coulomb_friction"),
     told_apart_by="same speed at different positions; changes sign with the direction",
-    step_rate=lambda p: dry_friction_rate(p["growth"] * (0.5 * p["stroke"]) ** 2, p["moving_mass"]),
+    step_rate=lambda p: dry_friction_rate(p["growth"] * (0.5 * p["stroke"]) ** 2, p),
 )

@@ -14,7 +14,9 @@ from hydraulic_sim.base import BRISTLE_LENGTH, BRISTLE_TIME
 from hydraulic_sim.effect import Effect, Parameter
 
 
-def bristle(length, time):
+def bristle(length, time, bristle_length, bristle_time):
+    if length <= bristle_length:
+        return bristle_length, bristle_time
     return length, time
 
 

@@ -5,14 +5,16 @@
 Source: Visintin (1994), Differential Models of Hysteresis, ch. III (play operator).
 """
 
+import math
+
 from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.kernels import play
 
 
-def lag_behind(reading, memory, half_gap):
+def lag_behind(reading, memory, velocity, half_gap):
     if memory[0] == 0.0:
         memory[0] = 1.0
-        memory[1] = reading
+        memory[1] = reading - math.copysign(half_gap, velocity) if velocity != 0.0 else reading
     memory[1] = play(reading, half_gap, memory[1])
     return memory[1]
 

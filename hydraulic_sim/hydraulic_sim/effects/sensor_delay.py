@@ -9,7 +9,12 @@ from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.kernels import delayed
 
 
-def delay_reading(reading, memory, dt, delay):
+def delay_reading(reading, memory, dt, velocity, delay):
+    if memory[0] == 0.0:  # as if it had always moved like this
+        size = len(memory) - 1
+        memory[0] = 1.0 * size
+        for back in range(size):
+            memory[1 + (size - back) % size] = reading - velocity * back * dt
     return delayed(reading, delay, dt, memory)
 
 

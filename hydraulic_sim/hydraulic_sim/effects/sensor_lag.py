@@ -10,14 +10,14 @@ import math
 from hydraulic_sim.effect import Effect, Parameter
 
 
-def follow(reading, memory, dt, time):
+def follow(reading, memory, dt, velocity, time):
     if time <= 0.0:
         return reading
     if memory[0] == 0.0:
         memory[0] = 1.0
-        memory[1] = reading
+        memory[1] = reading - velocity * time  # as if it had always moved like this
         memory[2] = reading
-        return reading
+        return memory[1]
     slope = (reading - memory[2]) / dt
     fade = math.exp(-dt / time)
     memory[1] = reading - slope * time + (memory[1] - memory[2] + slope * time) * fade

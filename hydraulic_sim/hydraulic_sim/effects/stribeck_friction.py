@@ -37,7 +37,5 @@ EFFECT = Effect(
     excited_by="the lowest speeds, through standstill",
     confused_with=("coulomb_friction", "presliding"),
     told_apart_by="the lowest speeds: friction falls as the speed rises",
-    step_rate=lambda p: max(
-        dry_friction_rate(p["rise"], p["moving_mass"]), 0.86 * p["rise"] / (p["speed"] * p["moving_mass"])
-    ),
+    step_rate=lambda p: max(dry_friction_rate(p["rise"], p), 0.86 * p["rise"] / (p["speed"] * p["moving_mass"])),
 )

@@ -109,6 +109,18 @@ def fit(
         pieces = cut(records, plant, settings.length, settings.robust)
     except SegmentError as error:
         raise CalibrationError(str(error)) from None
+    return fit_pieces(model, plant, pieces, keys, settings, progress)
+
+
+def fit_pieces(
+    model: Model,
+    plant: Plant,
+    pieces: Sequence[Pieces],
+    keys: Sequence[str],
+    settings: Settings,
+    progress: Callable[[int, float], None] | None = None,
+) -> Fit:
+    """As `fit`, to pieces that were cut before."""
     values = {k: model.value(k) for k in keys}
     scales = {k: scale(model, k) for k in keys}
     shooting = Shooting(plant, pieces)

@@ -8,7 +8,7 @@ parameters (Bock 1987, multiple shooting; here without continuity between pieces
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,12 @@ Array = NDArray[np.float64]
 MEASURED = ("position", "pressure_a", "pressure_b")
 """Channels that are fitted, where a record has them."""
 _FEWEST = 20  # samples of a piece
+_VELOCITY_COLUMN = 1
 _SMOOTHING = 15  # samples of the quadratic through which initial values are read
 _STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
-_PRIOR = {"position": 20.0, "pressure_a": 40.0, "pressure_b": 40.0}  # of the noise: how far a start may be off
+# Of the noise: how far a start may be off what was measured there. Sensors with an offset or a wrong scale are off by
+# far more than their noise, and the samples of the piece hold the start anyway.
+_PRIOR = {"position": 1000.0, "pressure_a": 200.0, "pressure_b": 200.0}
 _UNMEASURED_PRESSURE = 2e6  # Pa
 _VELOCITY = 0.2  # m/s
 _NUMERICAL = 1e-6  # of a channel's range: a noise-free record is not held to less
@@ -41,7 +44,8 @@ class Pieces:
     """The pieces of one record.
 
     ``starts`` (S,) sample indices, ``samples`` per piece; ``measured`` (S, samples, C) in units of ``noise`` (C,);
-    ``states`` (S, n_states) to start from; ``free`` the indices of the states that are estimated, F of them, and
+    ``states`` (S, n_states) to start from; ``seen`` (N, 4) position, velocity and pressures of the whole record,
+    smoothed, NaN where they were not measured; ``free`` the indices of the states that are estimated, F of them, and
     ``prior`` (F,) how far each may be off [the state's unit].
     """
 
@@ -52,8 +56,13 @@ class Pieces:
     noise: Array
     measured: Array
     states: Array
+    seen: Array
     free: NDArray[np.int64]
     prior: Array
+
+    def some(self, chosen: NDArray[np.bool_]) -> Pieces:
+        """Those pieces that are ``chosen`` (S,)."""
+        return replace(self, starts=self.starts[chosen], measured=self.measured[chosen], states=self.states[chosen])
 
 
 def cut(records: Sequence[Record], plant: Plant, length: float, robust: bool = False) -> list[Pieces]:
@@ -86,9 +95,9 @@ def _cut(record: Record, plant: Plant, length: float, robust: bool) -> Pieces:
     index = starts[:, None] + np.arange(samples)
     measured = np.stack([record[c][index] for c in channels], axis=-1) / noise
     free, prior = _free_states(plant, channels, dict(zip(channels, noise, strict=True)))
-    return Pieces(
-        record, starts, samples, channels, noise, measured, _states(record, plant, channels, starts), free, prior
-    )
+    seen = _seen(record, channels)
+    states = _states(record, plant, seen, starts)
+    return Pieces(record, starts, samples, channels, noise, measured, states, seen, free, prior)
 
 
 def _noise(values: Array, robust: bool) -> float:
@@ -110,20 +119,27 @@ def _free_states(plant: Plant, channels: tuple[str, ...], noise: dict[str, float
     return np.array(free), np.array(prior)
 
 
-def _states(record: Record, plant: Plant, channels: tuple[str, ...], starts: NDArray[np.int64]) -> Array:
-    """Where each piece starts: measured values smoothed, the velocity by a derivative filter, the rest at ease."""
-    names = plant.state_names
+def _seen(record: Record, channels: tuple[str, ...]) -> Array:
+    """Measured values smoothed, the velocity by a derivative filter: (N, 4), NaN for what has no sensor."""
     position = record["position"]
     velocity = VelocityFilter.for_signal(position, record.dt, noise_floor(position))(position)
+    missing = np.full(len(record), np.nan)
+    smooth = {c: savgol_filter(record[c], _SMOOTHING, 2) for c in channels}
+    return np.stack(
+        [smooth["position"], velocity, smooth.get("pressure_a", missing), smooth.get("pressure_b", missing)], axis=-1
+    )
+
+
+def _states(record: Record, plant: Plant, seen: Array, starts: NDArray[np.int64]) -> Array:
+    """Where each piece starts: at what was seen, the rest at ease."""
     states = np.tile(plant.initial_state().states, (starts.size, 1))
     command = np.clip(record["drive"] / plant.value("drive_limit"), -1.0, 1.0)
-    for column, name in enumerate(names):
-        if name == "velocity":
-            states[:, column] = velocity[starts]
-        elif name in channels:
-            states[:, column] = savgol_filter(record[name], _SMOOTHING, 2)[starts]
+    for column, name in enumerate(plant.state_names):
+        if column < seen.shape[1]:
+            known = np.isfinite(seen[starts, column])
+            states[known, column] = seen[starts[known], column]
         elif name == "stick":
-            states[:, column] = np.clip(velocity[starts] / _STICK_SPEED, -1.0, 1.0)
+            states[:, column] = np.clip(seen[starts, _VELOCITY_COLUMN] / _STICK_SPEED, -1.0, 1.0)
         elif plant.layout.state_records[name].initial == "command":
             states[:, column] = command[np.maximum(starts - 1, 0)]
     return states

@@ -72,8 +72,11 @@ class Shooting:
 
     def residuals(self, values: Mapping[str, float], starts: Sequence[Array] | None = None) -> list[Array]:
         """(S, m) per record, measured − simulated over noise with the starts' priors appended."""
+        return self.run(self.plant.with_parameters(dict(values)), starts)
+
+    def run(self, plant: Plant, starts: Sequence[Array] | None = None) -> list[Array]:
+        """As `residuals`, of another plant."""
         chosen = self.starts if starts is None else starts
-        plant = self.plant.with_parameters(dict(values))
         return self._map(lambda i: self._residual(plant, i, chosen[i]), range(len(self.pieces)))
 
     def linearise(self, values: Mapping[str, float]) -> list[Linear]:
@@ -121,11 +124,21 @@ class Shooting:
 
     def _residual(self, plant: Plant, i: int, states: Array) -> Array:
         pieces = self.pieces[i]
-        run = plant.predict(pieces.record["drive"], pieces.record.dt, pieces.starts, pieces.samples - 1, states)
+        run = self._run(plant, pieces, states)
         simulated = np.stack([run[c] for c in pieces.channels], axis=-1) / pieces.noise
         off = (pieces.states[:, pieces.free] - states[:, pieces.free]) / pieces.prior
         off = np.where(self._unseen[i], self.misfit * off, off)
         return np.concatenate(((pieces.measured - simulated).reshape(len(pieces.starts), -1), off), axis=1)
+
+    def _run(self, plant: Plant, pieces: Pieces, states: Array) -> dict[str, Array]:
+        """The pieces simulated; states that no sensor sees follow the record up to each start."""
+        drive, dt, memories = pieces.record["drive"], pieces.record.dt, None
+        if plant.has_inner_states:
+            tracked, memories = plant.track(drive, dt, pieces.starts, pieces.seen)
+            inner = [i for i, name in enumerate(plant.state_names) if i >= pieces.seen.shape[1] and name != "stick"]
+            states = states.copy()
+            states[:, inner] = tracked[:, inner]
+        return plant.predict(drive, dt, pieces.starts, pieces.samples - 1, states, memories)
 
     def _linearise(self, plant: Plant, i: int) -> Linear:
         pieces, states = self.pieces[i], self.starts[i]
