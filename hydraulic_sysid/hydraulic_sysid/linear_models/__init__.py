@@ -7,6 +7,8 @@ from .instruments import fit_arx_instruments
 from .model import LinearModel
 from .poles import Pole
 from .series import OFFSETS
+from .state_space import StateSpaceModel
+from .subspace import fit_state_space
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
 
 __all__ = [
@@ -16,9 +18,11 @@ __all__ = [
     "IdentificationError",
     "LinearModel",
     "Pole",
+    "StateSpaceModel",
     "TransferFunctionModel",
     "TransferFunctionOrder",
     "fit_arx",
     "fit_arx_instruments",
+    "fit_state_space",
     "fit_transfer_function",
 ]

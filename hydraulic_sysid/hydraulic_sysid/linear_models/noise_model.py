@@ -28,11 +28,12 @@ def fit_noise(errors: Sequence[Array], longest: int = LONGEST) -> tuple[Array, f
     """
     longest = max(0, min(longest, (min(v.size for v in errors) - 1) // 10))
     past, target = _regression(errors, longest)
-    best, least, loss = np.empty(0), np.inf, float(np.mean(target**2))
+    best: Array = np.empty(0)
+    least, loss = np.inf, float(np.mean(target**2))
     if loss == 0.0:
         return best, 0.0
     for order in range(longest + 1):
-        d, *_ = np.linalg.lstsq(past[:, :order], target, rcond=None)
+        d: Array = np.asarray(np.linalg.lstsq(past[:, :order], target, rcond=None)[0], dtype=float)
         left = float(np.mean((target - past[:, :order] @ d) ** 2))
         criterion = target.size * np.log(max(left, np.finfo(float).tiny)) + 2.0 * order
         if criterion < least:

@@ -47,7 +47,7 @@ def triangle(chunks: Iterable[Sequence[Array]]) -> tuple[Array, int]:
     stacked = np.vstack(found)
     while len(stacked) > _CHUNK:
         stacked = _reduced(np.ascontiguousarray(stacked.T))
-    return np.linalg.qr(stacked, mode="r"), rows
+    return np.asarray(np.linalg.qr(stacked, mode="r")), rows
 
 
 def _reduced(part: Array) -> Array:
@@ -58,7 +58,8 @@ def _reduced(part: Array) -> Array:
     rest = part[:, whole:].T
     if not whole:
         return rest
-    return np.vstack((np.linalg.qr(blocks, mode="r").reshape(-1, k), rest))
+    factors: Array = np.asarray(np.linalg.qr(blocks, mode="r"))
+    return np.vstack((factors.reshape(-1, k), rest))
 
 
 def solve(chunks: Iterable[Sequence[Array]]) -> Solution:
