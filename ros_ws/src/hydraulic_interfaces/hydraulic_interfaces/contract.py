@@ -13,6 +13,7 @@ PLANT_NODE = "plant"
 EXCITATION_NODE = "excitation"
 RECORDER_NODE = "recorder"
 CONTROLLER_NODE = "controller"
+REFERENCE_NODE = "reference"
 ESTIMATOR_NODE = "estimator"
 
 PISTON = "piston"
@@ -69,6 +70,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic("reference", _JOINTS, "stream", "reference", "name [piston], position [m], velocity [m/s]"),
     Topic("predicted_state", _JOINTS, "stream", "estimator", "as state, from the model on the applied drive"),
     Topic("residual", _JOINTS, "stream", "estimator", "measured minus predicted, as state"),
+    Topic("description", "std_msgs/msg/String", "latched", "plant", "JSON: what the plant is and how it is set"),
     Topic("experiment", "std_msgs/msg/String", "latched", "excitation", "JSON: started, finished or aborted run"),
     Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "diagnostics", "every node", "health"),
 )

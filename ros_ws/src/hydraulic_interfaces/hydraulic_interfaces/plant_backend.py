@@ -28,6 +28,13 @@ class PlantBackend(ABC):
     """How many missed cycles are made up for, late but at their own sampling instants (a simulation can, a
     real plant cannot); what is missed beyond is skipped and counted."""
 
+    tolerated_lateness: float = 1.0
+    """A cycle that begins later than this share of the period is left out (beyond `catch_up`), and counted: its sample
+    would be nearer to the next instant than to its own where the share is above one half."""
+
+    warning: str = ""
+    """What the user should know although nothing has to stop."""
+
     fault: str = ""
     """What is wrong with the plant while it is wrong: the node then holds 0 V until `reset`."""
 
@@ -46,18 +53,34 @@ class PlantBackend(ABC):
         then keeps its value too.
         """
 
+    def sampling_rate(self, values: Mapping[str, Any]) -> float:
+        """Rate of the steps, Hz; asked after `configure`, with the same values."""
+        return float(values["rate"])
+
+    def description(self) -> Mapping[str, Any]:
+        """What this plant is, as plain data; asked after `configure`, published, and kept with every record."""
+        return {"hardware": self.hardware_id}
+
     @abstractmethod
     def activate(self) -> None:
         """Make ready to be stepped, at 0 V."""
+
+    def first_instant(self, earliest_ns: int) -> int:
+        """When the first step is due, at or after `earliest_ns` of the monotonic clock; the others follow by periods.
+
+        A plant with a beat of its own keeps the loop in time with it here.
+        """
+        return earliest_ns
 
     def set_enabled(self, on: bool) -> None:  # noqa: B027 - a plant without an enable is a valid plant
         """Follow the gate: commands move the actuator from now on, or no longer."""
 
     @abstractmethod
-    def step(self, stamp_ns: int, drive: float, dt: float) -> PlantSample:
+    def step(self, stamp_ns: int, drive: float, dt: float) -> PlantSample | None:
         """The sample of the instant `stamp_ns`; `drive` [V] is applied from this instant on, for `dt` [s].
 
-        `drive` is finite and within the limits. The sample's drive is what was really applied.
+        `drive` is finite and within the limits. The sample's drive is what was really applied. None where the sensors
+        gave no sample for this instant.
         """
 
     @abstractmethod

@@ -59,6 +59,8 @@ class LoopTiming:
 class PlantLoop:
     """Runs `backend` from `start` to `stop`; `error` holds the exception that ended it, if one did.
 
+    `samples` counts what was published, `lost` the cycles without a sample.
+
     Samples are stamped with their scheduled sampling instant. `last_stamp_ns` carries on from an earlier run,
     so that stamps increase even if the wall clock was set back in between.
     """
@@ -75,6 +77,7 @@ class PlantLoop:
         self.error: Exception | None = None
         self.scheduling = "normal"
         self.samples = 0
+        self.lost = 0
         self.drive = 0.0
         self.last_stamp_ns = last_stamp_ns
         self._backend, self._gate, self._ports, self._timing = backend, gate, ports, timing
@@ -146,14 +149,15 @@ class PlantLoop:
         gate.forget()  # a drive that an earlier run was ended with
         wall_period = timing.period_ns / timing.factor
         catch_up = _OWN_CLOCK_CATCH_UP if timing.own_clock else self._backend.catch_up
-        origin = time.monotonic_ns() + round(wall_period)
+        origin = self._backend.first_instant(time.monotonic_ns() + round(wall_period))
+        grace = 1.0 - self._backend.tolerated_lateness
         self._wall_offset_ns = time.time_ns() - time.monotonic_ns()
         first_stamp = max(origin + self._wall_offset_ns, self.last_stamp_ns + timing.period_ns)
         slot = 0
         while not self._stopping:
             due = origin + round(slot * wall_period)
             actual = wait(due)
-            behind = int((actual - due) / wall_period)
+            behind = int((actual - due) / wall_period + grace)
             lost = max(behind - catch_up, 0)
             monitor.tick(due, actual, 0 if timing.own_clock else lost)
             if timing.own_clock:
@@ -161,6 +165,8 @@ class PlantLoop:
                 origin += round(lost * wall_period)
             else:
                 slot += lost
+                if lost and grace > 0.0:
+                    wait(origin + round(slot * wall_period))
             stamp = first_stamp + slot * timing.period_ns
             now = stamp if timing.own_clock else time.time_ns()
             if timing.own_clock:
@@ -177,6 +183,9 @@ class PlantLoop:
 
     def _sample(self, stamp_ns: int, drive: float) -> None:
         sample = self._backend.step(stamp_ns, drive, self._timing.period_ns * 1e-9)
+        if sample is None:
+            self.lost += 1
+            return
         self._ports.publish(sample)
         self.drive = sample.drive
         self.last_stamp_ns = sample.stamp_ns

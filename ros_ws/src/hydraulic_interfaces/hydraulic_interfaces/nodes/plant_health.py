@@ -52,6 +52,8 @@ class PlantHealth:
             return self._status("plant", ERROR, error or self._backend.fault, values)
         if gate.stopped:
             return self._status("plant", ERROR, f"stopped until reset: {gate.stop_reason}", values)
+        if self._backend.warning:
+            return self._status("plant", WARN, self._backend.warning, values)
         enabled = "enabled" if gate.enabled else "not enabled"
         return self._status("plant", OK, f"{state}, {enabled}", values)
 
@@ -91,6 +93,7 @@ class PlantHealth:
             "run_jitter_max_ms": f"{report.run_jitter_max * 1e3:.4f}",
             "lateness_max_ms": f"{report.lateness_max * 1e3:.4f}",
             "samples": loop.samples,
+            "lost": loop.lost,
             "overruns": report.overruns,
             "skipped": report.skipped,
             "wall_clock_step_s": f"{step:.4f}",
@@ -100,6 +103,8 @@ class PlantHealth:
         overruns = self._moved("overruns", report.overruns)
         if skipped:
             return self._status("timing", ERROR, f"{skipped} sampling instants skipped", values)
+        if lost := self._moved("lost", loop.lost):
+            return self._status("timing", WARN, f"{lost} cycles without a sample", values)
         if abs(step) > _CLOCK_STEP_S:
             message = f"wall clock was set by {step:.3f} s: re-activate to stamp with the new time"
             return self._status("timing", WARN, message, values)

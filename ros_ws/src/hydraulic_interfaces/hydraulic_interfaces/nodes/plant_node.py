@@ -45,6 +45,11 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
 )
 
 
+def parameters_of(backend: PlantBackend) -> list[ParameterSpec]:
+    """Parameters of the node; one that the backend has under the same name takes the place of the node's own."""
+    return list({spec.name: spec for spec in (*PARAMETERS, *backend.parameters())}.values())
+
+
 class PlantNode(LifecycleNode):
     """Topics, services, lifecycle and diagnostics of `backend` as the contract says."""
 
@@ -59,9 +64,7 @@ class PlantNode(LifecycleNode):
         self._last_stamp_ns = 0
         self._late_parameters: list[str] = []
         self.gate = CommandGate()
-        self._table = ParameterTable(
-            self, (*PARAMETERS, *backend.parameters()), self._apply, lambda: self._state != "unconfigured"
-        )
+        self._table = ParameterTable(self, parameters_of(backend), self._apply, lambda: self._state != "unconfigured")
         self.gate.watchdog = self._table["watchdog"]
         self._ports = PlantPorts(self)
         self._health = PlantHealth(self.get_fully_qualified_name(), self.gate, backend)
@@ -99,15 +102,14 @@ class PlantNode(LifecycleNode):
         self._error = ""
         try:
             values = self._table.values()
-            self._timing = LoopTiming(
-                period_ns=round(1e9 / values["rate"]),
-                factor=values.get("real_time_factor", 1.0),
-                own_clock=values.get("publish_clock", False),
-                priority=values["realtime_priority"],
-            )
-            if self.get_parameter("use_sim_time").value and not self._timing.own_clock:
+            own_clock = values.get("publish_clock", False)
+            if self.get_parameter("use_sim_time").value and not own_clock:
                 raise ValueError("use_sim_time is true: a plant follows no other clock, it may only publish one")
+            factor = values.get("real_time_factor", 1.0)
+            LoopTiming(1, factor, own_clock)  # refuses what contradicts itself before anything is loaded
             late = self._backend.configure(values)
+            period_ns = round(1e9 / self._backend.sampling_rate(values))
+            self._timing = LoopTiming(period_ns, factor, own_clock, values["realtime_priority"])
             self._late_parameters = [spec.name for spec in late]
             self._table.declare(late)
             for spec in late:
@@ -120,6 +122,7 @@ class PlantNode(LifecycleNode):
             self._ports.open_clock()
             self.set_parameters([Parameter("use_sim_time", value=False)])
         self._table.warn_of_unknown()
+        self._ports.describe(self._backend.description())
         self._state = "inactive"
         return SUCCESS
 

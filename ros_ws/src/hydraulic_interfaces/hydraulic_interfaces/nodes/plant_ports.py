@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from itertools import islice
 from typing import Any
 
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 
 from hydraulic_interfaces.command_gate import CommandGate
 from hydraulic_interfaces.contract import find_topic
@@ -32,6 +34,7 @@ class PlantPorts:
         self._pressures = tuple(self._publisher(node, f"pressure_{name}") for name in ("a", "b", "supply"))
         self._retracted = self._publisher(node, "limit_retracted")
         self._extended = self._publisher(node, "limit_extended")
+        self._description = self._publisher(node, "description")
         self._limits: tuple[bool, bool] | None = None
         self._clock: Any = None
         self._node = node
@@ -70,6 +73,10 @@ class PlantPorts:
             self._limits = limits
             self._retracted.publish(Bool(data=limits[0]))
             self._extended.publish(Bool(data=limits[1]))
+
+    def describe(self, plant: Mapping[str, Any]) -> None:
+        """Tell everybody, also who comes later, what the plant is."""
+        self._description.publish(String(data=json.dumps(plant)))
 
     def open_clock(self) -> None:
         """Become the source of time for every node on simulated time."""

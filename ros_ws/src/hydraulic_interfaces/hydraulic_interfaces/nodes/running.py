@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 
 from hydraulic_interfaces.nodes import command_line
 from hydraulic_interfaces.nodes.exit_guard import exit_guard
-from hydraulic_interfaces.nodes.plant_node import PARAMETERS, PlantNode
+from hydraulic_interfaces.nodes.plant_node import PlantNode, parameters_of
 from hydraulic_interfaces.plant_backend import PlantBackend
 
 _SPIN_S = 1.0
@@ -30,7 +30,7 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     through the lifecycle's shutdown while everything still works, so the last thing the plant sees is 0 V.
     Where that is not possible, because the thread that serves ROS or the plant loop does not return, the code is 1.
     """
-    parser = command_line.parser(description, (*PARAMETERS, *backend.parameters()))
+    parser = command_line.parser(description, parameters_of(backend))
     parser.add_argument("--autostart", action="store_true", help="configure and activate at start")
     options = command_line.start(parser, argv)
     overrides = [Parameter("autostart", value=True)] if options.autostart else []
