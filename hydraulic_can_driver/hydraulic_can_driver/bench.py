@@ -1,0 +1,258 @@
+"""One bench on a bus, from opening it to giving it back: boot, start, one cycle per SYNC, stop.
+
+Lifecycle calls come from one thread, `cycle` from the loop's own once it runs. Until the valve says that it is ACTIVE,
+and whenever anything is wrong, the setpoint sent is 0.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from hydraulic_can_driver.bus import Bus
+from hydraulic_can_driver.cia408 import CONTROL_WORDS, State, StateMachine, describe
+from hydraulic_can_driver.codec import PdoCodec
+from hydraulic_can_driver.errors import BusDownError, CanDriverError, DeviceError
+from hydraulic_can_driver.faults import NEEDS_CONFIGURE, Fault, FaultLatch
+from hydraulic_can_driver.frames import Frames
+from hydraulic_can_driver.master import PRE_OPERATIONAL, START, Master
+from hydraulic_can_driver.measuring import Measuring
+from hydraulic_can_driver.receiver import HEARTBEAT, OPERATIONAL, Receiver
+from hydraulic_can_driver.supervision import Supervision
+from hydraulic_can_driver.sync import Beat, KernelBeat, LoopBeat
+from hydraulic_interfaces.samples import PlantSample
+
+KERNEL_SYNC = ("socketcan",)
+"""Interfaces whose kernel sends messages periodically by itself."""
+
+_QUIET = (State.INIT, State.DISABLED)
+
+
+class Bench:
+    """The devices of `bus` on an open interface.
+
+    :raises BusDownError: the interface cannot be opened.
+    """
+
+    def __init__(self, bus: Bus, interface: str = "", channel: str = "") -> None:
+        interface = interface or bus.interface
+        kernel = interface in KERNEL_SYNC
+        self.bus = bus
+        self.faults = FaultLatch()
+        self.frames = Frames(bus, self.faults)
+        self.receiver = Receiver(bus, self.frames, self.faults, interface, kernel)
+        self.supervision = Supervision(bus, self.receiver, self.frames, self.faults)
+        self.machine = StateMachine(bus.monitoring.state_change)
+        self.measuring = Measuring(bus)
+        self.readings: dict[str, dict[str, float]] = {}
+        self.operational = False
+        self._period = 1.0 / bus.rate
+        self._codec = PdoCodec(bus.drive_pdo)
+        self._changed = threading.Condition()
+        self._looping = False
+        self._next_heartbeat = 0.0
+        self.master = Master(bus, self.receiver, interface, channel)
+        self.beat: Beat = (
+            KernelBeat(self.master, self.frames, round(1e9 * self._period))
+            if kernel
+            else LoopBeat(self.master, self.frames)
+        )
+
+    def boot(self) -> None:
+        """Check who is there, set the valve to 0 and off, boot and map all devices, read back what they are set to.
+
+        :raises DeviceError: a device does not answer, is another one, or refuses something.
+        :raises BusDownError: nothing can be sent.
+        """
+        for node in self.bus.nodes.values():
+            self.master.command(node, PRE_OPERATIONAL)
+            self.master.identify(node)
+        self._quieten()
+        for node in self.bus.nodes.values():
+            self.master.boot(node)
+        self.readings = {node.name: self.master.readings(node) for node in self.bus.nodes.values()}
+
+    def start(self) -> None:
+        """All devices operational, all frames there, the valve DISABLED at 0 V.
+
+        :raises DeviceError: it does not come to that; the text says why.
+        """
+        self._no_errors()
+        self.master.watch_master(self.bus.valve, True)
+        self.faults.clear()
+        self.machine = StateMachine(self.bus.monitoring.state_change)
+        self.measuring.forget()
+        self._looping, self.operational = False, True
+        self.beat.start()
+        for node in self.bus.nodes.values():
+            self.master.command(node, START)
+        self._cycles_until(self._ready, 3.0 * self.bus.monitoring.state_change)
+        if not self._ready():
+            raise DeviceError(f"the bench is not ready: {self._reason()}")
+        self.supervision.begin(time.monotonic())
+        self.receiver.watching = self.faults.armed = True
+
+    def follow(self, goal: State) -> None:
+        """Lead the valve to ACTIVE or DISABLED; once the loop runs, wait until the valve says that it is there.
+
+        :raises DeviceError: it does not follow.
+        """
+        with self._changed:
+            self.machine.ask(goal, time.monotonic())
+            if self._looping and not self._wait(lambda: self.machine.arrived or bool(self.machine.problem)):
+                raise DeviceError(f"{self._reason()}; expected {goal.name}")
+            if self.machine.problem:
+                raise DeviceError(self.machine.problem)
+
+    def cycle(self, stamp_ns: int, drive: float) -> PlantSample | None:
+        """One SYNC of the running loop: send the drive [V], give the sample; None if not all frames came in time."""
+        self._looping = True
+        self.supervision.check(time.monotonic())
+        complete, frame = self._exchange(drive)
+        self.supervision.cycle(stamp_ns, complete)
+        with self._changed:
+            sample = self._take(stamp_ns, frame) if complete else None
+            if self.machine.problem and not self.faults.text:
+                self.faults.report(Fault.VALVE, self.machine.problem)
+            self._changed.notify_all()
+        return sample
+
+    def reset(self) -> None:
+        """Reset the fault of the valve, and forget all others whose cause is gone.
+
+        :raises DeviceError: a cause is still there, or the devices have to be configured anew.
+        """
+        if not self._looping:
+            return
+        if any(fault in self.faults for fault in NEEDS_CONFIGURE):
+            raise DeviceError(f"{self.faults.text}: deactivate, clean up and configure anew")
+        if silent := self.supervision.silent(time.monotonic()):
+            raise DeviceError(f"no heartbeat: {', '.join(silent)}")
+        self._no_errors()
+        with self._changed:
+            self.faults.clear()
+            self.measuring.forget()
+            self.supervision.begin(time.monotonic())
+            self.machine.reset(time.monotonic())
+            if not self._wait(lambda: self.machine.arrived or bool(self.faults.text)) or self.faults.text:
+                raise DeviceError(self.faults.text or self._reason())
+
+    def stop(self) -> None:
+        """0 V and disabled, seen in the status word; then nobody operational any more. May be called again.
+
+        :raises DeviceError: the valve was not seen to be disabled.
+        """
+        if not self.operational:
+            return
+        self.receiver.watching = self.faults.armed = False
+        why = self.faults.text
+        try:
+            for goal in (State.DISABLED, State.INIT):
+                self.machine = StateMachine(self.bus.monitoring.state_change)
+                self.machine.fail("stopping")
+                self.machine.control = CONTROL_WORDS[goal]
+                self._cycles_until(lambda goal=goal: self.machine.state is goal, self.bus.monitoring.state_change)  # type: ignore[misc]
+            if self.machine.state not in _QUIET:
+                raise DeviceError(f"the valve was not seen to be disabled: {why or self._reason()}")
+        finally:
+            self.operational = self._looping = False
+            self.beat.stop()
+            self._dismiss()
+
+    def close(self) -> None:
+        """Give the bus back."""
+        try:
+            self.stop()
+        finally:
+            self.master.close()
+
+    @property
+    def problem(self) -> str:
+        """What is wrong while the bench runs."""
+        return self.faults.text
+
+    def _exchange(self, drive: float) -> tuple[bool, bytes]:
+        """Send drive and SYNC; whether all frames came, and the frame that was sent."""
+        with self._changed:
+            problem = self.faults.text
+            if problem:
+                self.machine.fail(problem)
+            setpoint = self.measuring.allowed(drive) if self.machine.active else 0.0
+            frame, _ = self._codec.encode({"control_word": self.machine.control, "drive": setpoint})
+        try:
+            now = time.monotonic()
+            if self._looping and now >= self._next_heartbeat:
+                self._next_heartbeat = now + self.bus.master.heartbeat
+                self.master.send(HEARTBEAT + self.bus.master.id, bytes([OPERATIONAL]))
+            in_time = self.beat.exchange(self.bus.drive_pdo.cob_id, frame)
+        except BusDownError as error:
+            self.faults.report(Fault.BUS, str(error))
+            in_time = False
+        complete = self.frames.wait(time.monotonic() + self.bus.monitoring.frames_within * self._period)
+        self.frames.end()
+        return complete and in_time, frame
+
+    def _take(self, stamp_ns: int, frame: bytes) -> PlantSample:
+        found = self.frames.quantities()
+        self.machine.advance(int(found["status_word"]), time.monotonic())
+        for fault, text in self.measuring.problems(stamp_ns, found):
+            self.faults.report(fault, text)
+        return self.measuring.sample(stamp_ns, self._codec.decode(frame)["drive"], found)
+
+    def _cycles_until(self, done: Callable[[], bool], patience: float) -> None:
+        """Cycles of its own at 0 V, before the loop begins and after it has ended."""
+        end = due = time.monotonic()
+        end += patience
+        while not done() and due < end:
+            complete, frame = self._exchange(0.0)
+            if complete:
+                with self._changed:
+                    self._take(self.frames.sync_ns, frame)
+            due = max(due + self._period, time.monotonic() - self._period)
+            time.sleep(max(due - time.monotonic(), 0.0))
+
+    def _ready(self) -> bool:
+        if self.machine.arrived and self.machine.goal is State.INIT:
+            self.machine.ask(State.DISABLED, time.monotonic())
+        states = self.receiver.states
+        operational = all(states.get(node.name) == OPERATIONAL for node in self.bus.nodes.values() if node.heartbeat)
+        return operational and self.machine.arrived and self.machine.goal is State.DISABLED
+
+    def _reason(self) -> str:
+        silent = [node.name for node in self.bus.nodes.values() if self.receiver.states.get(node.name) != OPERATIONAL]
+        if lacking := self.frames.lacking():
+            return f"no frames from {', '.join(lacking)}"
+        if self.machine.problem:
+            return self.machine.problem
+        if silent:
+            return f"no heartbeat that says OPERATIONAL from {', '.join(silent)}"
+        return f"the valve is {describe(self.machine.status or 0)}"
+
+    def _wait(self, done: Callable[[], bool]) -> bool:
+        return self._changed.wait_for(done, 4.0 * self.bus.monitoring.state_change + 1.0)
+
+    def _no_errors(self) -> None:
+        for node in self.bus.nodes.values():
+            # The valve tells its faults in the status word, and is reset by the control word.
+            if node is not self.bus.valve and (register := self.master.error_register(node)):
+                raise DeviceError(f"{node.name} reports an error: error register 0x{register:02X}")
+
+    def _quieten(self) -> None:
+        """Setpoint 0 and control word 0 by SDO: the valve may have been left, or have started, active."""
+        valve = self.bus.valve
+        for signal in reversed(self.bus.drive_pdo.signals):
+            self.master.write(valve, signal.address, 0)
+
+    def _dismiss(self) -> None:
+        """Everybody pre-operational, and nobody watches the driver any more; tries all, whatever fails."""
+        steps: list[Callable[[], None]] = [
+            lambda node=node: self.master.command(node, PRE_OPERATIONAL)  # type: ignore[misc]
+            for node in self.bus.nodes.values()
+        ]
+        steps += [self._quieten, lambda: self.master.watch_master(self.bus.valve, False)]
+        for step in steps:
+            try:
+                step()
+            except CanDriverError as error:
+                self.faults.report(Fault.BUS, str(error))

@@ -1,0 +1,97 @@
+"""The frames that answer one SYNC: complete or not, of the right length, in time.
+
+`begin`, `wait` and `end` are called around a cycle; `take` by the thread that receives, for every frame as it comes.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable
+
+from hydraulic_can_driver.bus import Bus, Node
+from hydraulic_can_driver.codec import PdoCodec
+from hydraulic_can_driver.errors import CodecError
+from hydraulic_can_driver.faults import Fault, FaultLatch
+
+
+class Frames:
+    """Frames of all devices by COB-ID."""
+
+    def __init__(self, bus: Bus, faults: FaultLatch) -> None:
+        self._codecs = {pdo.cob_id: PdoCodec(pdo) for node in bus.nodes.values() for pdo in node.transmit}
+        self._nodes = {pdo.cob_id: node for node in bus.nodes.values() for pdo in node.transmit}
+        self._faults = faults
+        self._changed = threading.Condition(threading.Lock())
+        self._raw: dict[int, bytes] = {}
+        self._missing: set[int] = set(self._codecs)
+        self._open = False
+        self.cycle = 0
+        self.sync_ns = 0
+        self.late = 0
+
+    @property
+    def cob_ids(self) -> Iterable[int]:
+        """COB-IDs of all frames that belong to a cycle."""
+        return self._codecs
+
+    def begin(self, stamp_ns: int) -> None:
+        """A SYNC was sent or heard at `stamp_ns` (wall time): from here on frames belong to it."""
+        with self._changed:
+            self._missing = set(self._codecs)
+            self._open = True
+            self.cycle += 1
+            self.sync_ns = stamp_ns
+            self._changed.notify_all()
+
+    def end(self) -> None:
+        """What comes from here to the next SYNC is late."""
+        with self._changed:
+            self._open = False
+
+    def take(self, cob_id: int, data: bytes) -> None:
+        """A frame has come."""
+        codec = self._codecs[cob_id]
+        if len(data) != codec.pdo.length:
+            try:
+                codec.unpack(data)
+            except CodecError as error:
+                self._faults.report(Fault.LENGTH, f"{self._nodes[cob_id].name}: {error}")
+            return
+        with self._changed:
+            # A second one within a cycle means that the first belonged to the cycle before.
+            if not self._open or cob_id not in self._missing:
+                self.late += 1
+            self._raw[cob_id] = data
+            self._missing.discard(cob_id)
+            if not self._missing:
+                self._changed.notify_all()
+
+    def wait_sync(self, cycle: int, until: float) -> bool:
+        """Wait until a SYNC beyond number `cycle` has begun, at the longest until `until` of `time.monotonic`."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self.cycle > cycle, max(until - time.monotonic(), 0.0))
+
+    def wait(self, until: float) -> bool:
+        """Whether all frames of the cycle are there; waits for them at the longest until `until`."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._missing, max(until - time.monotonic(), 0.0))
+
+    def lacking(self) -> list[str]:
+        """Names of the devices whose frames are missing in this cycle."""
+        with self._changed:
+            missing = sorted(self._missing)
+        return list(dict.fromkeys(self._nodes[cob_id].name for cob_id in missing))
+
+    def quantities(self) -> dict[str, float]:
+        """Latest value of every signal, in SI; words of bits as integers."""
+        with self._changed:
+            frames = dict(self._raw)
+        found: dict[str, float] = {}
+        for cob_id, data in frames.items():
+            found |= self._codecs[cob_id].decode(data)
+        return found
+
+    def sender(self, cob_id: int) -> Node:
+        """The device that sends a frame."""
+        return self._nodes[cob_id]

@@ -1,0 +1,106 @@
+"""Watches over time: heartbeats of the devices, gaps between SYNCs, cycles without all frames; keeps the counts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from hydraulic_can_driver.bus import Bus
+from hydraulic_can_driver.faults import Fault, FaultLatch
+from hydraulic_can_driver.frames import Frames
+from hydraulic_can_driver.receiver import STATES, Receiver
+
+LATE = 0.25
+"""A SYNC that is off its instant by more than this share of the period is late, and counted."""
+
+# Bits of a frame with n bytes of data and an 11-bit identifier, with interframe space, and the share of stuff bits
+# that is typical; at most it is 1 in 5 of the 34 + 8 n bits that are stuffed.
+_FRAME_BITS, _STUFFED_BITS, _TYPICAL_STUFFING = 47, 34, 0.1
+
+
+def bus_load(bus: Bus) -> float:
+    """Share of the bit rate that the cyclic frames take: SYNC, drive, the devices' frames, heartbeats."""
+    pdos = [pdo.length for node in bus.nodes.values() for pdo in (*node.receive, *node.transmit)]
+    per_second = bus.rate * sum(map(_bits, [0, *pdos])) + _bits(1) / bus.master.heartbeat
+    per_second += sum(_bits(1) / node.heartbeat for node in bus.nodes.values() if node.heartbeat)
+    return per_second / bus.bitrate
+
+
+def _bits(length: int) -> float:
+    return _FRAME_BITS + 8 * length + _TYPICAL_STUFFING * (_STUFFED_BITS + 8 * length)
+
+
+class Supervision:
+    """Reports to `faults`; `begin`, `check` and `cycle` belong to the thread of the cycle."""
+
+    def __init__(self, bus: Bus, receiver: Receiver, frames: Frames, faults: FaultLatch) -> None:
+        self._bus, self._receiver, self._frames, self._faults = bus, receiver, frames, faults
+        self._load = bus_load(bus)
+        self._began = self._last_sync = 0.0
+        self.cycles = self.missed = self.late = 0
+        self._missed_in_a_row = 0
+        self._worst_ns = 0
+
+    def begin(self, now: float) -> None:
+        """Everything is well at `now` (monotonic, s)."""
+        self._began = self._last_sync = now
+        self._missed_in_a_row = 0
+
+    def silent(self, now: float) -> list[str]:
+        """Devices whose heartbeat is overdue."""
+        patience, heard = self._bus.monitoring.heartbeats, self._receiver.heard
+        return [
+            f"{node.name} for {now - last:.2f} s"
+            for node in self._bus.nodes.values()
+            if node.heartbeat
+            and now - (last := max(heard.get(node.name, 0.0), self._began)) > patience * node.heartbeat
+        ]
+
+    def check(self, now: float) -> None:
+        """Before a cycle: have the devices been heard, and was the last SYNC not long ago?"""
+        if silent := self.silent(now):
+            self._faults.report(Fault.HEARTBEAT, f"no heartbeat: {', '.join(silent)}")
+        gap = now - self._last_sync
+        if gap > self._bus.monitoring.sync_gap:
+            limit = self._bus.monitoring.sync_gap
+            self._faults.report(Fault.SYNC, f"no SYNC for {gap:.3f} s, allowed are {limit:g} s: the loop was held up")
+        self._last_sync = now
+
+    def cycle(self, stamp_ns: int, complete: bool) -> None:
+        """After a cycle: were all frames there, and was the SYNC where it belongs?"""
+        self.cycles += 1
+        deviation = abs(self._frames.sync_ns - stamp_ns)
+        self._worst_ns = max(self._worst_ns, deviation)
+        if deviation > LATE * 1e9 / self._bus.rate:
+            self.late += 1
+        if complete:
+            self._missed_in_a_row = 0
+            return
+        self.missed += 1
+        self._missed_in_a_row += 1
+        if self._missed_in_a_row == self._bus.monitoring.missed_cycles:
+            who = ", ".join(self._frames.lacking()) or "the SYNC"
+            self._faults.report(Fault.FRAMES, f"no frames in time in {self._missed_in_a_row} cycles in a row: {who}")
+
+    def report(self) -> Mapping[str, str]:
+        """Rows for the diagnostics."""
+        receiver, now = self._receiver, time.monotonic()
+        rows = {
+            "bus_load_percent": f"{100.0 * self._load:.1f}",
+            "cycles": str(self.cycles),
+            "cycles_missed": str(self.missed),
+            "syncs_late": str(self.late),
+            "sync_deviation_max_ms": f"{self._worst_ns * 1e-6:.4f}",
+            "frames_late": str(self._frames.late),
+            "frames_unexpected": str(receiver.unexpected),
+            "emergencies": " | ".join(receiver.emergencies),
+            "fault_log": " | ".join(self._faults.log),
+        }
+        for fault, count in self._faults.counts.items():
+            rows[f"faults_{fault.name.lower()}"] = str(count)
+        for node in self._bus.nodes.values():
+            state = receiver.states.get(node.name)
+            told = "silent" if state is None else STATES.get(state, f"state {state}")
+            age = now - receiver.heard[node.name] if node.name in receiver.heard else float("nan")
+            rows[f"node_{node.name}"] = f"{told}, heartbeat {age:.3f} s ago"
+        return rows
