@@ -65,10 +65,8 @@ class Bench:
         for h in self.hidden:
             for key, sizes in h.values.items():
                 size = sizes[SEVERITIES.index(self.severity)]
-                if key == "missing_codes":
-                    values[key] = size
-                    continue
-                size *= rng.uniform(1.0 - SIZE_SCATTER, 1.0 + SIZE_SCATTER)
+                if h.name != "missing_codes":  # a bit has a whole number, a converter its step
+                    size *= rng.uniform(1.0 - SIZE_SCATTER, 1.0 + SIZE_SCATTER)
                 if key in h.signed and rng.random() < 0.5:
                     size = -size
                 values[key] = 1.0 + size if key == "sensor_scale" else size
@@ -113,9 +111,9 @@ def make(bench: Bench, *, without: tuple[str, ...] = (), noise: bool = True) -> 
         if h.name not in without:
             values |= {key: extra[key] for key in h.values}
     return {
-        name: plant.run(values, experiments.drive(name, bench.rng(name)), bench.rng(f"{name} noise") if noise else None)[
-            0
-        ]
+        name: plant.run(
+            values, experiments.drive(name, bench.rng(name)), bench.rng(f"{name} noise") if noise else None
+        )[0]
         for name in experiments.NAMES
     }
 
@@ -152,7 +150,9 @@ def model_text(bench: Bench) -> str:
     if "viscous_friction" in known:
         lines.append(f"  viscous_friction: {{{row('coefficient', s['viscous'], 'N*s/m', 0.2)}}}")
     if "coulomb_friction" in known:
-        lines.append("  coulomb_friction: {level: {value: 450 N, source: known to be there; size not on the data sheet}}")
+        lines.append(
+            "  coulomb_friction: {level: {value: 450 N, source: known to be there; size not on the data sheet}}"
+        )
     if "internal_leakage" in known:
         lines.append(f"  internal_leakage: {{{row('coefficient', s['leakage'], 'm^3/(s*Pa)', 0.2)}}}")
     return "\n".join([*lines, "history: []", ""])

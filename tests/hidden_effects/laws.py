@@ -29,14 +29,19 @@ def edge(lift, rounding):
     return 0.5 * (lift + math.sqrt(lift * lift + rounding * rounding))
 
 
+PLAYS = (0.7, 0.9, 1.1, 1.3)
+
+
 @njit
-def bent_play(value, last, lag, width, bend):
-    """Rate-independent hysteresis of Duhem type (Coleman & Hodgdon 1986): the lag w turns to ±1 over ``bend``."""
-    step = value - last
-    if width <= 0.0 or step == 0.0:
-        return lag
-    side = 1.0 if step > 0.0 else -1.0
-    return side + (lag - side) * math.exp(-abs(step) / bend)
+def bent_play(value, width, held):
+    """Rate-independent hysteresis of Prandtl & Ishlinskii: the mean of four plays whose half widths lie around
+    ``width``, so that loops are round (Visintin 1994, ch. III). ``held`` (4,) is their memory."""
+    total = 0.0
+    for i in range(4):
+        half = width * PLAYS[i]
+        held[i] = min(max(held[i], value - half), value + half)
+        total += held[i]
+    return 0.25 * total
 
 
 @njit
@@ -54,9 +59,9 @@ def opening(s, p, t, pa, pb, o_last):
 @njit
 def metering(o, p, t):
     """One land's relative area over its lift."""
-    if p.gain_progression != 0.0:  # a bent window: slope 1−c at null, 1 at full opening, exponent 2.2
+    if p.gain_progression != 0.0:  # a bent window: slope 1−c at null, 1 at full opening, exponent 2.1
         size = min(abs(o), 2.0)
-        o = o * (1.0 - p.gain_progression) + math.copysign(p.gain_progression * size**2.2, o)
+        o = o * (1.0 - p.gain_progression) + math.copysign(p.gain_progression * size**2.1, o)
     if p.gain_ripple != 0.0:
         o *= 1.0 + p.gain_ripple * math.sin(2.0 * math.pi * o / p.gain_ripple_length)
     if p.gain_asymmetry != 0.0:
@@ -110,7 +115,7 @@ def past_piston(drop, x, p, thin):
 
 
 @njit
-def friction_level(v, x, pa, pb, dwell, p):
+def friction_level(v, x, pa, pb, t, p):
     """Level of dry friction towards which the bristles bend, N (never negative)."""
     g = p.coulomb
     if p.coulomb_difference != 0.0:
@@ -126,8 +131,8 @@ def friction_level(v, x, pa, pb, dwell, p):
     if p.stribeck_rise != 0.0:
         ratio = v / p.stribeck_speed
         g += p.stribeck_rise * math.exp(-ratio * ratio)
-    if p.dwell_friction != 0.0:
-        g += p.dwell_friction * dwell
+    if p.friction_drift != 0.0:
+        g *= 1.0 + p.friction_drift * (1.0 - math.exp(-t / p.friction_drift_time))
     return max(g, 1.0)
 
 
@@ -161,13 +166,13 @@ def outer_force(x, v, t, thin, p):
 
 @njit
 def contact(lead, lead_rate, p):
-    """Pull of a load behind a gap, N: Hertzian contact with Hunt & Crossley damping, never pulling back."""
+    """Pull of a load behind a gap, N: a contact between linear and Hertzian with Hunt & Crossley damping."""
     depth = abs(lead) - 0.5 * p.gap
     if depth <= 0.0:
         return 0.0
     side = 1.0 if lead > 0.0 else -1.0
     w = 2.0 * math.pi * p.gap_frequency
-    # Hertz: k·d^1.5 that equals the linear contact at a tenth of a millimetre of depth
-    stiff = p.gap_mass * w * w * depth * math.sqrt(depth / 1e-4)
+    # k·d^1.15, equal to the linear contact at a tenth of a millimetre of depth
+    stiff = p.gap_mass * w * w * depth * (depth / 1e-4) ** 0.15
     damp = 2.0 * p.gap_damping * w * p.gap_mass * min(depth / 1e-4, 1.0)
     return side * max(stiff + damp * side * lead_rate, 0.0)

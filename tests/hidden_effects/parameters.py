@@ -90,8 +90,8 @@ UNKNOWN_LAWS: dict[str, float] = {
     "periodic_length": 0.02,
     "cogging": 0.0,  # N
     "cogging_length": 0.03,
-    "dwell_friction": 0.0,  # N, break-away that grows with rest
-    "dwell_time": 0.4,
+    "friction_drift": 0.0,  # relative change of dry friction in the long run
+    "friction_drift_time": 6.0,
     "hump_friction": 0.0,  # N, friction with a maximum at a middle speed, negative slope beyond
     "hump_speed": 0.05,
     "shaker": 0.0,  # N, a force from outside

@@ -31,7 +31,7 @@ def run(
     Returns two tables of columns (n,): what was recorded, and the states behind it.
     """
     n = len(feed)
-    p = parameters.record(values if rng is not None else values | {"sensor_step": 1e-12})
+    p = parameters.record(values if rng is not None else {"sensor_step": 1e-12} | values)
     noise = np.zeros((3, n))
     if rng is not None:
         noise = rng.standard_normal((3, n)) * np.array([[POSITION_NOISE], [PRESSURE_NOISE], [PRESSURE_NOISE]])

@@ -21,9 +21,9 @@ RING = 8192  # substeps of true position kept for the sensor's dead time
 
 
 @njit
-def acceleration(x, v, pa, pb, z, x2, v2, x3, v3, dwell, t, thin, p):
+def acceleration(x, v, pa, pb, z, x2, v2, x3, v3, t, thin, p):
     """Accelerations of piston, second mass and the mass behind the gap, and the bristles' rate."""
-    g = laws.friction_level(v, x, pa, pb, dwell, p)
+    g = laws.friction_level(v, x, pa, pb, t, p)
     stiff = p.coulomb / p.bristle
     rate = v - stiff * abs(v) * z / g
     damping = p.bristle_time * math.exp(-((v / 0.01) ** 2))  # fades with speed, else LuGre is not passive
@@ -57,15 +57,13 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
     x2, v2, x3, v3 = x, v, x, v
     s, sr, s3 = 0.0, 0.0, 0.0
     slewed = 0.0
-    lag_w, u_last = 0.0, 0.0
     ps, pt = p.supply, p.tank
     cycle_a, cycle_b = 0.5, 0.0
     o = 0.0
     creep_a, creep_b = pa, pb
-    dwell = 0.0
     f1, f2 = x, x
-    held = x
-    held_w = 0.0
+    linkage = np.full(4, x)
+    magnet = np.zeros(4)
     floor_x, floor_v = 0.0, 0.0
     seen_a, seen_b = pa, pb
     rate_a, rate_b = 0.0, 0.0
@@ -89,9 +87,7 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
             part = back - whole
             y = (1.0 - part) * ring[(count - whole) % RING] + part * ring[(count - whole - 1) % RING]
         if p.sensor_play > 0.0:
-            held_w = laws.bent_play(y, held, held_w, p.sensor_play, 0.35 * p.sensor_play)
-            held = y
-            y = y - p.sensor_play * held_w
+            y = laws.bent_play(y, p.sensor_play, linkage)
         if p.sensor_cubic > 0.0:
             size = 1.0 / math.sqrt(6.0 * p.sensor_cubic)
             y = size * math.sinh(y / size)
@@ -120,9 +116,7 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
             late = int(math.floor((t - p.command_delay) / dt))
             command = out[late, 0] / p.drive_limit if late >= 0 else 0.0
             if p.hysteresis > 0.0:
-                lag_w = laws.bent_play(command, u_last, lag_w, p.hysteresis, 0.5 * p.hysteresis)
-                u_last = command
-                command = command - p.hysteresis * lag_w
+                command = laws.bent_play(command, p.hysteresis, magnet)
             if p.spool_rate > 0.0:  # saturating pilot flow into the spool's end chambers
                 slewed += h * p.spool_rate * math.tanh(1500.0 * (command - slewed) / p.spool_rate)
                 command = slewed
@@ -144,7 +138,7 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
             forward = laws.edge(o + shift, rounding)
             backward = laws.edge(-o + shift, rounding)
             # --- first half-kick, explicit
-            a1, a2, a3 = acceleration(x, v, pa, pb, z, x2, v2, x3, v3, dwell, t - half, thin, p)
+            a1, a2, a3 = acceleration(x, v, pa, pb, z, x2, v2, x3, v3, t - half, thin, p)
             v += half * a1
             v2 += half * a2
             v3 += half * a3
@@ -201,7 +195,7 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
             x += h * v
             x2 += h * v2
             x3 += h * v3
-            g = laws.friction_level(v, x_mid, pa, pb, dwell, p)
+            g = laws.friction_level(v, x_mid, pa, pb, t, p)
             bend = p.coulomb / p.bristle * abs(v) / g
             if bend * h > 1e-9:
                 fade = math.exp(-bend * h)
@@ -210,9 +204,9 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
                 z += h * v
             dry += h * v * p.coulomb / p.bristle * z
             # --- second half-kick, implicit in the speeds (slope by difference)
-            a1, a2, a3 = acceleration(x, v, pa, pb, z, x2, v2, x3, v3, dwell, t + half, thin, p)
+            a1, a2, a3 = acceleration(x, v, pa, pb, z, x2, v2, x3, v3, t + half, thin, p)
             dv = 1e-7
-            b1, _, _ = acceleration(x, v + dv, pa, pb, z, x2, v2 + dv, x3, v3 + dv, dwell, t + half, thin, p)
+            b1, _, _ = acceleration(x, v + dv, pa, pb, z, x2, v2 + dv, x3, v3 + dv, t + half, thin, p)
             slope = min((b1 - a1) / dv, 0.0)
             v += half * a1 / (1.0 - half * slope)
             v2 += half * a2
@@ -228,10 +222,6 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
                 w = 2.0 * math.pi * p.limit_cycle_frequency * 1.8
                 cycle_b += h * w * (4.0 * (1.0 - cycle_a * cycle_a) * cycle_b - cycle_a)
                 cycle_a += h * w * cycle_b
-            if p.dwell_friction != 0.0:
-                if abs(v) < 2e-4:
-                    dwell += (1.0 - dwell) * h / p.dwell_time
-                dwell *= math.exp(-h * abs(v) / 1e-4)
             # --- sensors that remember
             count += 1
             ring[count % RING] = x
@@ -249,6 +239,3 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
                 seen_b += (pb - seen_b) * fade
             else:
                 seen_a, seen_b = pa, pb
-
-
-
