@@ -99,7 +99,7 @@ def test_without_fades_the_signal_is_whole():
 def test_shipped_plans_are_named_as_their_files_and_stay_within_the_drive(name):
     plan = load_plan(name)
     assert plan.name == name
-    assert plan.rate == 1000.0 and plan.duration == 20.0
+    assert plan.rate == 1000.0 and plan.duration == (26.0 if name == "probe" else 20.0)
     assert 0.9 < np.abs(plan.open_loop).max() < 10.0
     assert plan.travel_limit < 1.524 / 2
 
@@ -122,7 +122,7 @@ def test_shipped_plans_cover_the_four_kinds_of_the_first_bench():
         ({"duration": None}, ["duration = None", "triangle has no length"]),
         ({"amplitude": 3}, ["amplitude = 3", "one of the keys name, signal, travel_limit"]),
         ({"signal": "chirp"}, ["signal = 'chirp'", "kind: chirp | multisine"]),
-        ({"signal": {"kind": "prbs"}}, ["signal: kind = 'prbs'", "chirp | multisine"]),
+        ({"signal": {"kind": "noise"}}, ["signal: kind = 'noise'", "chirp | multisine"]),
         ({"signal": {"kind": "triangle", "amplitude": 1.0}}, ["signal: triangle: frequency", "missing"]),
         (
             {"signal": {"kind": "triangle", "amplitude": 1.0, "frequency": 700}},
@@ -151,7 +151,7 @@ def test_a_missing_key_is_named(tmp_path, missing):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (None, ["No such file", "chirp, multisine, steps, triangle"]),
+        (None, ["No such file", "chirp, multisine, probe, steps, triangle"]),
         ("name: [", ["not a readable plan"]),
         ("- a\n- b\n", ["YAML mapping"]),
         ("", ["YAML mapping"]),

@@ -35,7 +35,8 @@ CHIRPS = st.builds(
 
 def test_the_folder_is_the_list():
     assert set(signal_kinds()) == {
-        "chirp", "multisine", "playback", "random_phase_multisine", "steps", "triangle"
+        "chirp", "multisine", "odd_random_phase_multisine", "playback", "prbs", "random_phase_multisine", "sawtooth",
+        "sine", "square", "staircase", "steps", "triangle"
     }  # fmt: skip
     assert signal_kinds()["chirp"] is Chirp
 

@@ -15,6 +15,7 @@ from ruamel.yaml.error import YAMLError
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
+from hydraulic_sysid.excitation.prediction import Prediction
 from hydraulic_sysid.excitation.settings import Settings, number, section, text
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds
 from hydraulic_sysid.excitation.signals._base import Array
@@ -56,6 +57,7 @@ class Plan(Settings):
     )
     centring_gain: float = number("V/m", "drive per distance from the centre", 2.0, minimum=0.0, maximum=1000.0)
     centring_limit: float = number("V", "centring asks for no more", 0.5, minimum=0.0, maximum=DRIVE_LIMIT_V)
+    prediction: Prediction | None = section("what a model does under this plan", Prediction, None)
 
     def check(self) -> None:
         if self.duration is None:
@@ -116,6 +118,8 @@ class Plan(Settings):
         """Build from the content of a plan file; see `Settings.from_mapping`."""
         values = dict(mapping)
         values["signal"] = _signal(values.get("signal"), folder)
+        if isinstance(values.get("prediction"), Mapping):
+            values["prediction"] = Prediction.from_mapping(values["prediction"])
         return super().from_mapping(values, folder)
 
     def as_mapping(self) -> dict[str, Any]:
@@ -123,6 +127,8 @@ class Plan(Settings):
         signal = {"kind": _kind(self.signal), **self.signal.as_mapping()}
         values = super().as_mapping()
         first = {"name": values.pop("name"), "description": values.pop("description")}
+        if self.prediction is not None:
+            values["prediction"] = self.prediction.as_mapping()
         return {**first, **values, "signal": signal}
 
 

@@ -198,9 +198,9 @@ def path(doc: str, default: Any = MISSING) -> Any:
     return _declared(FilePath(doc), default)
 
 
-def section(doc: str, kind: type) -> Any:
+def section(doc: str, kind: type, default: Any = MISSING) -> Any:
     """A field holding other settings, of class `kind`."""
-    return _declared(Section(doc, "", kind), MISSING)
+    return _declared(Section(doc, "", kind), default)
 
 
 @dataclass(frozen=True)

@@ -102,8 +102,8 @@ class ExcitationNode(ServedNode):
 
     def _tell(self, event: str) -> None:
         self._experiment.publish(String(data=event))
-        if self._session.ended:
-            self._probe.end(self._session.ended is Phase.FINISHED, self._session.last_end)
+        if self._session.ended and self._session.run is not None:
+            self._probe.end(self._session.run.plan, self._session.ended is Phase.FINISHED, self._session.last_end)
         self.get_logger().info(self._session.last_end if self._session.ended else "started")
 
     def _on_state(self, message: JointState) -> None:
@@ -114,7 +114,7 @@ class ExcitationNode(ServedNode):
             return
         drive = self._session.answer(sample, time.monotonic())
         if self._session.run is not None:
-            self._probe.take(sample)
+            self._probe.take(self._session.run.plan, sample)
         if drive is not None:
             self._command.publish(self._encode(sample.stamp_ns, drive))
 

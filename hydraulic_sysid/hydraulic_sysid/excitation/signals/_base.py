@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
-from hydraulic_sysid.excitation.settings import Settings, number
+from hydraulic_sysid.excitation.settings import Settings, declared_fields, number
 
 Array = NDArray[np.float64]
+S = TypeVar("S", bound="Signal")
 
 
 def amplitude(doc: str) -> Any:
@@ -31,6 +32,22 @@ class Signal(Settings):
         """The drive [V] at the times `t` [s] from the signal's start; the same shape as `t`."""
         raise NotImplementedError
 
+    def scaled(self: S, factor: float) -> S:
+        """The same signal, `factor` times as large: every setting in volts is multiplied.
+
+        Raises:
+            PlanError: a setting leaves its range.
+        """
+        return replace(self, **{name: _times(getattr(self, name), factor) for name in self._volts()})
+
+    @property
+    def size(self) -> float:
+        """The largest of the settings in volts [V]; it grows with `scaled`."""
+        return max(float(np.max(np.abs(getattr(self, name)))) for name in self._volts())
+
+    def _volts(self) -> list[str]:
+        return [item.name for item in declared_fields(type(self)) if item.metadata["declaration"].unit == "V"]
+
     @property
     def length(self) -> float | None:
         """The signal's own length [s], None where it can go on for ever."""
@@ -40,3 +57,7 @@ class Signal(Settings):
     def highest_frequency(self) -> float:
         """The highest frequency [Hz] that the sampling must carry."""
         return 0.0
+
+
+def _times(value: Any, factor: float) -> Any:
+    return tuple(factor * item for item in value) if isinstance(value, tuple) else factor * value

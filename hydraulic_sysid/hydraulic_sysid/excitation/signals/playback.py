@@ -6,7 +6,7 @@ import csv
 import gzip
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -53,6 +53,13 @@ class Playback(Signal):
     def _table(self) -> tuple[Array, Array]:
         times, drives = read_drive(Path(self.file))
         return times - times[0], drives
+
+    def scaled(self, factor: float) -> Playback:
+        return replace(self, gain=factor * self.gain)
+
+    @property
+    def size(self) -> float:
+        return float(abs(self.gain) * np.abs(self._table[1]).max())
 
     @property
     def length(self) -> float:

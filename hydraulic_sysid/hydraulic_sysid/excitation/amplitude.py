@@ -1,0 +1,139 @@
+"""The largest amplitude of a plan within the limits of the bench, found on a model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.linear import operating_point
+from hydraulic_sim.model import Model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
+from hydraulic_sysid.excitation.plan import Plan
+from hydraulic_sysid.excitation.prediction import Prediction
+from hydraulic_sysid.excitation.rehearsal import Rehearsal, rehearse
+
+_TRAVEL_SHARE = 0.8
+_DRIVE_SHARE = 0.95
+_SPEED_SHARE = 0.9
+_CAVITATION_PA = 0.2e6
+_STEPS = 9
+_TOLERANCE = 0.01
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an excitation may ask for: drive [V], travel from the plan's centre [m], speed [m/s], pressures [Pa]."""
+
+    drive: float
+    travel: float
+    velocity: float
+    pressure_min: float
+    pressure_max: float
+
+    @classmethod
+    def of(cls, model: Model, centre: float = 0.0) -> Limits:
+        """Those of a model: 95 % of the drive, 80 % of the way from the centre to the nearer stop, 90 % of the speed
+        at full drive, at least 0.2 MPa above absolute vacuum in both chambers (below, air comes out of the oil), at
+        most the supply pressure and a quarter.
+        """
+        drive = model.value("drive_limit")
+        hydraulic = model.kind == "hydraulic"
+        speed = abs(operating_point(model, drive=drive).velocity) if hydraulic else float("inf")
+        return cls(
+            drive=_DRIVE_SHARE * drive,
+            travel=_TRAVEL_SHARE * (0.5 * model.value("stroke") - abs(centre)),
+            velocity=_SPEED_SHARE * speed,
+            pressure_min=_CAVITATION_PA if hydraulic else -float("inf"),
+            pressure_max=1.25 * model.value("supply_pressure") if hydraulic else float("inf"),
+        )
+
+    def broken(self, seen: Rehearsal, centre: float) -> str:
+        """Which limit a rehearsal breaks first in this list; empty when none."""
+        extremes = seen.extremes
+        travel = max(extremes.position_max - centre, centre - extremes.position_min)
+        if seen.aborted or travel > self.travel:
+            return "travel"
+        if extremes.drive_peak > self.drive:
+            return "drive"
+        if extremes.velocity_peak > self.velocity:
+            return "velocity"
+        if extremes.pressure_min < self.pressure_min:
+            return "cavitation"
+        return "pressure" if extremes.pressure_max > self.pressure_max else ""
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A plan with its prediction, and the rehearsal behind it."""
+
+    plan: Plan
+    rehearsal: Rehearsal
+
+
+def largest(plan: Plan, model: Model, limits: Limits | None = None, share: float = 1.0, cap: float = math.inf) -> Sized:
+    """`plan` with the largest amplitude at which its rehearsal on `model` breaks no limit, times `share`.
+
+    Found by bisection to 1 %; at most `cap` times what the plan has. The plan's travel and amplitude limits become
+    those of `limits`, so that the run on the bench aborts where the prediction promised that it would not go.
+
+    Raises:
+        ExcitationError: no amplitude down to a thousandth of the drive keeps the limits; says which one breaks.
+    """
+    limits = limits or Limits.of(model, plan.centre)
+    plant = Plant(model)
+    room = limits.drive - abs(plan.offset)
+    peak = _peak(plan)
+    if room <= 0.0 or peak <= 0.0:
+        raise ExcitationError(f"{plan.name}: an offset of {plan.offset:g} V leaves no drive below {limits.drive:g} V")
+    low, high = 0.0, min(room / peak, cap)
+    limit = "drive" if room / peak <= cap else "amplitude given"
+    best: Sized | None = None
+    factor = high
+    for _ in range(_STEPS):
+        seen, why = _try(plan, plant, limits, factor)
+        if not why:
+            best, low = seen, factor
+            if factor >= high * (1.0 - _TOLERANCE):
+                break
+        else:
+            high, limit = factor, why
+        if low > 0.0 and high - low < _TOLERANCE * low:
+            break
+        factor = 0.5 * (low + high) if low > 0.0 else 0.4 * high
+        if factor * peak < 1e-3 * limits.drive:
+            break
+    if best is None:
+        raise ExcitationError(
+            f"{plan.name}: no amplitude down to {factor * peak:.3g} V keeps within the limits; {limit} breaks first: "
+            "take a higher lowest frequency or wider limits"
+        )
+    if share < 1.0:
+        best, why = _try(plan, plant, limits, share * low)
+        limit = f"{share:.0%} of what {limit} allows"
+        if why or best is None:
+            raise ExcitationError(f"{plan.name}: at {share:.0%} of the largest amplitude {why} breaks")
+    assert best is not None
+    prediction: Prediction = replace(best.rehearsal.extremes, limited_by=limit)
+    return Sized(replace(best.plan, prediction=prediction), best.rehearsal)
+
+
+def _try(plan: Plan, plant: Plant, limits: Limits, factor: float) -> tuple[Sized | None, str]:
+    """The plan `factor` times as large and rehearsed; and the limit that it breaks."""
+    try:
+        signal = plan.signal.scaled(factor)
+        # The run stops a little beyond the limit that the rehearsal keeps: sensors are noisy.
+        bounded = replace(plan, signal=signal, amplitude_limit=limits.drive, travel_limit=1.1 * limits.travel)
+    except PlanError:
+        return None, "drive"
+    try:
+        rehearsal = rehearse(bounded, plant)
+    except SimulationError:
+        return None, "the model, which no step follows there,"
+    return Sized(bounded, rehearsal), limits.broken(rehearsal, plan.centre)
+
+
+def _peak(plan: Plan) -> float:
+    drive = plan.open_loop - plan.envelope * plan.offset
+    return float(max(abs(drive.max()), abs(drive.min())))
