@@ -1,0 +1,312 @@
+"""A CANopen device with power, identity, SDO, NMT, heartbeat, EMCY and process data; what it measures is a subclass's.
+
+`canopen.LocalNode` serves SDO and heartbeat. Its process data are not connected to its objects; here a frame carries
+the very bytes that an SDO upload of its objects would give.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import Any
+
+import can
+import canopen
+from canopen.objectdictionary import INTEGER_TYPES, SIGNED_TYPES, ODVariable
+
+from hydraulic_can_driver.bus import Node
+from hydraulic_can_driver.virtual.pdo import check_write
+from hydraulic_can_driver.virtual.plant import Reading
+from hydraulic_can_driver.virtual.process_data import ProcessData, Upsets
+from hydraulic_can_driver.virtual.wiring import Event, Wiring
+
+RESET_NODE, RESET_COMMUNICATION = 129, 130
+VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x06090031, 0x06090032
+_HISTORY = 8
+
+
+class _Served(canopen.LocalNode):
+    """`canopen`'s node; asks its device for the values and tells it of new ones."""
+
+    def __init__(self, device: Device, node_id: int, dictionary: canopen.ObjectDictionary) -> None:
+        super().__init__(node_id, dictionary)
+        self._device = device
+
+    def get_data(self, index: int, subindex: int, check_readable: bool = False) -> bytes:
+        stored = super().get_data
+        self._find_object(index, subindex)
+        return self._device.read(
+            index, subindex, check_readable, lambda: bytes(stored(index, subindex, check_readable))
+        )
+
+    def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
+        store = super().set_data
+        self._device.write(
+            index, subindex, bytes(data), check_writable, lambda: store(index, subindex, data, check_writable)
+        )
+
+
+class Device:
+    """One device of the bus file. `power_on` boots it; without power it neither hears nor says anything."""
+
+    profile = 0
+
+    def __init__(self, spec: Node, wiring: Wiring) -> None:
+        self.spec, self.name, self.wiring = spec, spec.name, wiring
+        self.upsets = Upsets()
+        self.node: canopen.LocalNode | None = None
+        self.stored: dict[tuple[int, int], int] = {}  # settings that survive a loss of power
+        self.pdos = ProcessData(self, wiring.network, wiring.lock, lambda number: self._say("rpdo", str(number)))
+        self._dictionary = canopen.import_od(str(wiring.eds(spec)), spec.id)
+        self._image: dict[tuple[int, int], float] = {}
+        self._connected = False
+
+    @property
+    def powered(self) -> bool:
+        """Whether it has power."""
+        return self.node is not None
+
+    @property
+    def operational(self) -> bool:
+        """Whether it exchanges process data."""
+        return self.node is not None and self._connected and self.node.nmt.state == "OPERATIONAL"
+
+    def power_on(self) -> None:
+        """Boot: stored settings, boot-up message, PRE-OPERATIONAL."""
+        if self.node is not None:
+            return
+        self._image.clear()
+        self.node = _Served(self, self.spec.id, self._dictionary)
+        for (index, sub), value in self.stored.items():
+            self.take_bytes(index, sub, self._object(index, sub).encode_raw(value))
+        self.start()
+        self.connect()
+        self._say("power", "on")
+        self._boot()
+
+    def power_off(self) -> None:
+        """The supply fails: silent from this moment on."""
+        if self.node is None:
+            return
+        self.disconnect()
+        self.node = None
+        self.halt()
+        self._say("power", "off")
+
+    def connect(self) -> None:
+        """Join the bus, without a word."""
+        if self.node is None or self._connected:
+            return
+        self.node.associate_network(self.wiring.network)
+        # The bench hands NMT commands on, so that a device may vanish while one is being obeyed.
+        self.wiring.network.unsubscribe(0, self.node.nmt.on_command)
+        self._connected = True
+        self.pdos.configure(list(self._dictionary))
+        self._beat()
+
+    def disconnect(self) -> None:
+        """Leave the bus, as one that is bus-off or whose connector is out."""
+        if self.node is None or not self._connected:
+            return
+        self.node.nmt.stop_heartbeat()
+        self.pdos.close()
+        self.wiring.network.subscribe(0, self.node.nmt.on_command)  # which `remove_network` takes away again
+        self.node.remove_network()
+        self._connected = False
+
+    def on_nmt(self, command: int, data: bytes) -> None:
+        """An NMT command for this node or for all."""
+        node = self.node
+        if node is None or not self._connected:
+            return
+        if command == RESET_NODE:
+            self.power_off()
+            self.power_on()
+            return
+        was = self.operational
+        if command == RESET_COMMUNICATION:
+            self._boot()
+        else:
+            node.nmt.on_command(0, bytearray(data), 0.0)
+            self._say("nmt", node.nmt.state)
+        if was and not self.operational:
+            self.pdos.forget()
+            self.left_operational()
+        elif not was and self.operational:
+            self.pdos.forget()
+            self.entered_operational()
+
+    def take_over(self) -> None:
+        """A SYNC: what came for it since the last one is valid from now on."""
+        if self.operational:
+            self.pdos.take_over()
+
+    def transmit_synchronous(self) -> None:
+        """Send what goes with this SYNC."""
+        if self.operational:
+            self.pdos.transmit_synchronous()
+
+    def watch(self, now: float) -> None:
+        """Time goes by: called every few milliseconds of ``now`` [s]."""
+        if self.operational:
+            self.pdos.transmit_due(now)
+
+    def stop_heartbeat(self, on: bool) -> None:
+        """Whether heartbeats stop whatever 0x1017 says."""
+        self.upsets.no_heartbeat = on
+        self._beat()
+
+    def emergency(self, code: int, register: int, data: bytes = b"") -> None:
+        """Send an EMCY and keep it in the history; code 0 says that all is well again."""
+        if self.node is None:
+            return
+        self.set(0x1001, 0, register)
+        if code:
+            errors = [self.get(0x1003, n) for n in range(1, self.get(0x1003, 0) + 1)]
+            for n, error in enumerate([code, *errors][:_HISTORY], 1):
+                self.set(0x1003, n, error)
+            self.set(0x1003, 0, min(len(errors) + 1, _HISTORY))
+        if self._connected:
+            with contextlib.suppress(can.CanError):
+                self.node.emcy.send(code, register, data)
+        self._say("emcy", f"0x{code:04X}")
+
+    def get(self, index: int, sub: int = 0) -> Any:
+        """Number in an object, as an SDO upload would give it."""
+        return self._object(index, sub).decode_raw(self.object_bytes(index, sub))
+
+    def object_bytes(self, index: int, sub: int) -> bytes:
+        """Bytes of an object."""
+        assert self.node is not None, f"{self.name} has no power"
+        return self.node.get_data(index, sub)
+
+    def take_bytes(self, index: int, sub: int, data: bytes) -> None:
+        """Put bytes into an object from inside: nothing is refused."""
+        assert self.node is not None, f"{self.name} has no power"
+        self.node.set_data(index, sub, data)
+
+    def set(self, index: int, sub: int, value: float) -> None:
+        """Let an object read ``value`` from now on; cut to the range of its type."""
+        self._image[index, sub] = value
+
+    def store(self, index: int, sub: int, value: int) -> None:
+        """Set a parameter as with the maker's tool: it holds now and after every power-on."""
+        with self.wiring.lock:
+            self.stored[index, sub] = value
+            if self.node is not None:
+                self.take_bytes(index, sub, self._object(index, sub).encode_raw(value))
+
+    def read(self, index: int, sub: int, by_sdo: bool, stored: Callable[[], bytes]) -> bytes:
+        """Bytes of an object: what the device measures where it measures it, else what is ``stored``."""
+        with self.wiring.lock:
+            if by_sdo:
+                self._asked("sdo read", index, sub)
+            identity = self.upsets.identity.get(sub) if index == 0x1018 else None
+            value = self._image.get((index, sub)) if identity is None else identity
+            if value is None:
+                return stored()
+            od = self._object(index, sub)
+            if od.data_type in INTEGER_TYPES:
+                low = -(1 << len(od) - 1) if od.data_type in SIGNED_TYPES else 0
+                value = min(max(int(value), low), low + (1 << len(od)) - 1)
+            return bytes(od.encode_raw(value))
+
+    def write(self, index: int, sub: int, data: bytes, by_sdo: bool, store: Callable[[], None]) -> None:
+        """Take the bytes of an object, or answer with an SDO abort."""
+        with self.wiring.lock:
+            if by_sdo:
+                self._check(index, sub, data)
+            store()
+            self._image.pop((index, sub), None)
+            if 0x1400 <= index < 0x1C00 and self._connected:
+                self.pdos.configure(list(self._dictionary))
+            elif index == 0x1017:
+                self._beat()
+            self.written(index, sub)
+            if by_sdo:
+                self._asked("sdo write", index, sub)
+
+    # What a subclass makes of it.
+
+    def start(self) -> None:
+        """Power is on; settings are read, nothing is sent yet."""
+
+    def halt(self) -> None:
+        """Power is gone."""
+
+    def sense(self, reading: Reading) -> None:
+        """Put what the plant says now into the objects."""
+
+    def written(self, index: int, sub: int) -> None:
+        """An object has a new value, by SDO, by a PDO or by `store`."""
+
+    def refuse(self, index: int, sub: int, value: int) -> int:
+        """The SDO abort code for a write that the device does not accept; 0 accepts it."""
+        return 0
+
+    def received(self, number: int) -> None:
+        """A process data frame has come."""
+
+    def left_operational(self) -> None:
+        """Process data stop by an NMT command."""
+
+    def entered_operational(self) -> None:
+        """Process data begin."""
+
+    def _boot(self) -> None:
+        assert self.node is not None
+        self.node.nmt.state = "INITIALISING"
+        self.node.nmt.state = "PRE-OPERATIONAL"
+        self._beat()
+        self._say("nmt", "PRE-OPERATIONAL")
+
+    def _beat(self) -> None:
+        """Heartbeats as 0x1017 says, unless they have stopped."""
+        if self.node is None or not self._connected:
+            return
+        if self.upsets.no_heartbeat:
+            self.node.nmt.stop_heartbeat()
+        elif self.node.nmt.state != "INITIALISING":
+            self.node.nmt.start_heartbeat(self.get(0x1017))
+
+    def _asked(self, kind: str, index: int, sub: int) -> None:
+        """A master has asked for an object: what waited for this happens before the answer."""
+        self._say(kind, f"0x{index:04X}:{sub}")
+        self.wiring.settle()
+        if self.node is None:
+            raise canopen.SdoCommunicationError(f"{self.name} lost its power")
+        if (index, sub) in self.upsets.aborts:
+            raise canopen.SdoAbortedError(self.upsets.aborts[index, sub])
+
+    def _check(self, index: int, sub: int, data: bytes) -> None:
+        if (index, sub) in self.upsets.aborts:
+            raise canopen.SdoAbortedError(self.upsets.aborts[index, sub])
+        od = self._find(index, sub)
+        if od is None or od.data_type not in INTEGER_TYPES or 8 * len(data) != len(od) or not od.writable:
+            return  # the dictionary itself has the answer to that
+        value: Any = od.decode_raw(data)
+        if od.max is not None and value > od.max:
+            raise canopen.SdoAbortedError(VALUE_TOO_HIGH)
+        if od.min is not None and value < od.min:
+            raise canopen.SdoAbortedError(VALUE_TOO_LOW)
+        check_write(self.get, self._mappable, index, sub, value)
+        code = self.refuse(index, sub, value)
+        if code:
+            raise canopen.SdoAbortedError(code)
+
+    def _say(self, kind: str, detail: str) -> None:
+        self.wiring.tell(Event(kind, self.name, detail))
+
+    def _object(self, index: int, sub: int) -> ODVariable:
+        found = self._dictionary[index]
+        return found if isinstance(found, ODVariable) else found[sub]
+
+    def _find(self, index: int, sub: int) -> ODVariable | None:
+        try:
+            return self._object(index, sub)
+        except KeyError:
+            return None
+
+    def _mappable(self, index: int, sub: int) -> int:
+        found = self._find(index, sub)
+        return len(found) if found is not None and found.pdo_mappable else 0

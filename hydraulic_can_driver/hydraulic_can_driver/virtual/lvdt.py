@@ -1,0 +1,67 @@
+"""A linear transducer (CiA 406): position and speed in its own steps, work area, alarms."""
+
+from __future__ import annotations
+
+import math
+
+from hydraulic_can_driver.bus import Node
+from hydraulic_can_driver.virtual.device import Device
+from hydraulic_can_driver.virtual.plant import Reading
+from hydraulic_can_driver.virtual.wiring import Wiring
+
+ABOVE, BELOW = 0x2, 0x4
+"""Bits of the work area state 0x6400."""
+
+POSITION_ERROR = 0x1
+"""Bit of the alarms 0x6503."""
+
+SENSOR_FAULT = 0x5000
+"""EMCY: device hardware."""
+
+_POSITION_STEP, _SPEED_STEP = 1e-9, 1e-5  # 0x6005 counts 0.001 um and 0.01 mm/s
+
+
+class Lvdt(Device):
+    """Measures the piston. `jump` [m], `frozen`, `stuck_at` [m], `broken` and `area` (bits of 0x6400) are faults."""
+
+    profile = 406
+
+    def __init__(self, spec: Node, wiring: Wiring) -> None:
+        super().__init__(spec, wiring)
+        self.jump = 0.0
+        self.frozen = False
+        self.stuck_at: float | None = None
+        self.area = 0
+        self._broken = False
+        self._sign, self._zero = wiring.mounting("position")
+
+    @property
+    def broken(self) -> bool:
+        """Whether its cable is broken."""
+        return self._broken
+
+    @broken.setter
+    def broken(self, on: bool) -> None:
+        if on == self._broken:
+            return
+        self._broken = on
+        self.emergency(SENSOR_FAULT if on else 0, 0x81 if on else 0)
+
+    def sense(self, reading: Reading) -> None:
+        """See `Device.sense`."""
+        if self.frozen:
+            return
+        position = (reading.position if self.stuck_at is None else self.stuck_at) + self.jump
+        raw = round(self._sign * (position - self._zero) / (_POSITION_STEP * self.get(0x6005, 1)))
+        speed = reading.velocity if math.isfinite(reading.velocity) else 0.0
+        self.set(0x6503, 0, POSITION_ERROR if self._broken else 0)
+        if self._broken:
+            return
+        self.set(0x6004, 0, raw)
+        self.set(0x6030, 1, round(self._sign * speed / (_SPEED_STEP * self.get(0x6005, 2))))
+        state = ABOVE if raw > self.get(0x6402, 1) else BELOW if raw < self.get(0x6401, 1) else 0
+        self.set(0x6400, 1, state | self.area)
+
+    def refuse(self, index: int, sub: int, value: int) -> int:
+        """A step of 0 measures nothing."""
+        return 0x06090030 if index == 0x6005 and value == 0 else 0
