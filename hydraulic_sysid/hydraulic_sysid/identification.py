@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,29 +11,40 @@ from numpy.typing import NDArray
 
 from . import metrics
 from .decimation import trace
-from .linear_models import ArxModel, ArxOrder, IdentificationError, fit_arx
+from .linear_models import (
+    CRITERIA,
+    Arx,
+    Candidate,
+    IdentificationError,
+    LinearModel,
+    Structure,
+    TransferFunctionModel,
+    best,
+    try_orders,
+)
 from .noise import noise_floor
 from .records import Record
 from .resampling import held_average, sampled
 from .results import heading
+from .validation import residual_tests
 
 Array = NDArray[np.float64]
 
-_LAGS = 25
 _UNSTABLE = 1.01  # |z|; an estimated integrator may come out a little beyond 1
-_SHORTEST_TEST = 100  # samples from which on a residual's correlations mean something
 
 
 @dataclass(frozen=True)
 class Settings:
     """What a user may choose about an identification."""
 
-    order: ArxOrder = ArxOrder(3, 3, 1)
+    structure: Structure = Arx()
     sampling_time: float = 0.05
     """Seconds; the records are brought to it (see `resampling`)."""
     holdout: float = 0.2
     """Last part of every record that is kept from the fit, unless records are held out as a whole."""
     offsets: str = "estimate"
+    select: str | None = None
+    """Choose the order, up to that of ``structure``, by one of `linear_models.CRITERIA`."""
     input: str = "drive"
     output: str = "position"
 
@@ -50,13 +61,20 @@ class _Series:
 def identify(
     records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: Settings | None = None
 ) -> dict[str, Any]:
-    """Result document of an ARX model fitted to ``records`` and tried on ``held_out``.
+    """Result document of a linear model fitted to ``records`` and tried on ``held_out``.
 
     Without ``held_out`` the last part of every record is kept from the fit and tried on.
 
     :raises IdentificationError: no record, a channel missing, too little or too poor data, an impossible
-    sampling time.
+    sampling time or criterion.
     """
+    return identify_model(records, held_out, settings)[0]
+
+
+def identify_model(
+    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: Settings | None = None
+) -> tuple[dict[str, Any], LinearModel]:
+    """As `identify`; the model too."""
     settings = settings or Settings()
     if not records:
         raise IdentificationError("there is no record to identify from")
@@ -67,26 +85,68 @@ def identify(
         records, held_out = [first for first, _ in parts], [last for _, last in parts]
     fit_on = [_series(record, settings) for record in records]
     try_on = [_series(record, settings) for record in held_out]
-    model = fit_arx(
-        [s.u for s in fit_on], [s.y for s in fit_on], settings.sampling_time, settings.order, settings.offsets
-    )
+    data = [s.u for s in fit_on], [s.y for s in fit_on], settings.sampling_time, settings.offsets
+    structure, tried = settings.structure, None
+    if settings.select is not None:
+        candidates = try_orders(structure.up_to(), *data)
+        structure = best(candidates, settings.select).structure
+        tried = _orders(candidates)
+    model = structure.fit(*data)
     estimation = [_figures(model, s, noise_floor_of(s, settings)) for s in fit_on]
     validation = [_figures(model, s, noise_floor_of(s, settings)) for s in try_on]
     fpe = metrics.fpe(model.loss, model.parameters, model.samples)
-    return {
-        **heading("identify"),
+    result = {
+        **heading("identify", 2),
         "settings": {
-            "order": {"na": settings.order.na, "nb": settings.order.nb, "nk": settings.order.nk},
+            "structure": {"text": structure.text, **structure.document()},
             "sampling_time": settings.sampling_time,
             "offsets": settings.offsets,
+            "select": settings.select,
             "input": {"channel": settings.input, "unit": records[0].unit(settings.input)},
             "output": {"channel": settings.output, "unit": records[0].unit(settings.output)},
         },
-        "verdict": _verdict(settings, model, validation),
+        "verdict": _verdict(structure, model, validation),
         "model": _model_document(model),
-        "estimation": {"mse": model.loss, "fpe": fpe, "samples": model.samples, "records": estimation},
+        "orders": tried,
+        "estimation": {**_pooled(estimation), "mse": model.loss, "fpe": fpe, "records": estimation},
         "validation": {**_pooled(validation), "fpe": fpe, "records": validation},
     }
+    return result, model
+
+
+def about(result: dict[str, Any]) -> dict[str, Any]:
+    """What a model's file says besides the model: name, channels and units, orders, data, and how well it fits."""
+    settings, held = result["settings"], result["validation"]
+    ends = f"{settings['input']['channel']} to {settings['output']['channel']}"
+    return {
+        "name": f"{settings['structure']['text']} from {ends}",
+        "created": result["created"],
+        "software": result["software"],
+        "input": settings["input"],
+        "output": settings["output"],
+        "orders": settings["structure"],
+        "records": [r["source"] for r in result["estimation"]["records"]],
+        "held_out": {
+            key: held[key] for key in ("best_fit_free_run", "best_fit_one_step", "mse_free_run", "mse_one_step", "fpe")
+        },
+    }
+
+
+def _orders(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
+    """Rows of the table of orders, each with the criteria that would choose it."""
+    chosen: dict[int, list[str]] = {}
+    for criterion in CRITERIA:
+        if any(np.isfinite(getattr(c, criterion)) for c in candidates):
+            chosen.setdefault(id(best(candidates, criterion)), []).append(criterion)
+    return [
+        {
+            "text": c.structure.text,
+            **c.structure.document(),
+            **{key: getattr(c, key) for key in ("parameters", "loss", "fpe", "aic", "bic", "cv")},
+            "best_by": chosen.get(id(c), []),
+        }
+        for c in candidates
+    ]
 
 
 def noise_floor_of(series: _Series, settings: Settings) -> float:
@@ -105,7 +165,7 @@ def _series(record: Record, settings: Settings) -> _Series:
         y = sampled(record[settings.output], record.dt, settings.sampling_time)
     except ValueError as error:
         raise IdentificationError(f"{record.name}: {error}") from None
-    shortest = 2 * settings.order.memory + 2
+    shortest = 2 * settings.structure.memory + 2
     if u.size < shortest:
         raise IdentificationError(
             f"{record.name}: {u.size} samples at {settings.sampling_time:g} s are too few (at least "
@@ -114,10 +174,10 @@ def _series(record: Record, settings: Settings) -> _Series:
     return _Series(record, u, y)
 
 
-def _figures(model: ArxModel, series: _Series, noise: float) -> dict[str, Any]:
+def _figures(model: LinearModel, series: _Series, noise: float) -> dict[str, Any]:
     free = model.simulate(series.u, series.y)
     one = model.predict(series.u, series.y)
-    past = model.order.memory
+    past = model.memory
     if not np.isfinite(free).all():
         free = np.full_like(series.y, np.nan)  # an unstable model has no free run worth a figure
     runs = bool(np.isfinite(free).all())
@@ -130,11 +190,13 @@ def _figures(model: ArxModel, series: _Series, noise: float) -> dict[str, Any]:
         "duration": series.y.size * model.dt,
         "noise": noise,
         "best_fit_free_run": metrics.best_fit(series.y, free) if runs else float("nan"),
-        "best_fit_one_step": metrics.best_fit(series.y[past:], one[past:]),
+        "best_fit_one_step": _or_nan(metrics.best_fit, series.y[past:], one[past:]),
         "mse_free_run": metrics.mse(series.y, free) if runs else float("nan"),
-        "mse_one_step": metrics.mse(series.y[past:], one[past:]),
+        "mse_one_step": _or_nan(metrics.mse, series.y[past:], one[past:]),
         "r_squared_free_run": metrics.r_squared(series.y, free) if runs else float("nan"),
-        "residual_tests": _residual_tests(residual, series.u[past:]),
+        "r_squared_one_step": _or_nan(metrics.r_squared, series.y[past:], one[past:]),
+        "residual_tests": residual_tests(residual, series.u[past:]) if np.isfinite(residual).all() else None,
+        "free_run_tests": residual_tests(series.y - free, series.u) if runs else None,
         "traces": {
             "input": trace(time, series.u),
             "measured": trace(time, series.y),
@@ -146,16 +208,9 @@ def _figures(model: ArxModel, series: _Series, noise: float) -> dict[str, Any]:
     }
 
 
-def _residual_tests(residual: Array, drive: Array) -> dict[str, Any] | None:
-    """Correlations of the one-step residual with itself and with the input; None for too short a stretch."""
-    if residual.size < _SHORTEST_TEST or not (np.ptp(residual) > 0.0 and np.ptp(drive) > 0.0):
-        return None
-    return {
-        "lags": _LAGS,
-        "bound": 1.96 / np.sqrt(residual.size),
-        "autocorrelation": metrics.autocorrelation(residual, _LAGS),
-        "cross_correlation": metrics.cross_correlation(drive, residual, _LAGS),
-    }
+def _or_nan(figure: Callable[[Array, Array], float], measured: Array, predicted: Array) -> float:
+    """A figure of merit; NaN where an unstable model predicts nothing."""
+    return figure(measured, predicted) if np.isfinite(predicted).all() else float("nan")
 
 
 def _pooled(parts: Sequence[dict[str, Any]]) -> dict[str, float]:
@@ -171,22 +226,25 @@ def _pooled(parts: Sequence[dict[str, Any]]) -> dict[str, float]:
     }
 
 
-def _model_document(model: ArxModel) -> dict[str, Any]:
+def _model_document(model: LinearModel) -> dict[str, Any]:
     numerator, denominator = model.transfer_function()
-    names = [f"a{i + 1}" for i in range(model.order.na)]
-    names += [f"b{i + 1}" for i in range(model.order.nb)]
-    values = [*model.a, *model.b]
-    if model.standard_errors.size > len(values):
-        names, values = [*names, "c"], [*values, model.constant]
+    continuous = isinstance(model, TransferFunctionModel)
     return {
-        "type": "ARX",
+        "type": type(model).__name__.removesuffix("Model"),
         "coefficients": [
-            {"name": n, "value": v, "standard_error": e}
-            for n, v, e in zip(names, values, model.standard_errors, strict=True)
+            {"name": name, "value": value, "standard_error": error} for name, value, error in model.coefficients()
         ],
+        "minimised": model.minimised,
+        "parameters": model.parameters,
         "input_offset": model.input_offset,
         "output_offset": model.output_offset,
-        "transfer_function": {"numerator": numerator, "denominator": denominator, "sampling_time": model.dt},
+        "transfer_function": {
+            "numerator": numerator,
+            "denominator": denominator,
+            "domain": "continuous" if continuous else "discrete",
+            "sampling_time": model.dt,
+            "delay": model.delay if isinstance(model, TransferFunctionModel) else 0.0,
+        },
         "poles": [
             {
                 "real": p.value.real,
@@ -197,19 +255,20 @@ def _model_document(model: ArxModel) -> dict[str, Any]:
             }
             for p in model.poles()
         ],
-        "condition_number": model.condition_number,
+        "condition_number": getattr(model, "condition_number", None),
+        "singular_values": getattr(model, "singular_values", None),
     }
 
 
-def _verdict(settings: Settings, model: ArxModel, validation: Sequence[dict[str, Any]]) -> dict[str, str]:
-    order = settings.order
-    name = f"ARX({order.na}, {order.nb}, {order.nk}) at {settings.sampling_time * 1e3:g} ms"
+def _verdict(structure: Structure, model: LinearModel, validation: Sequence[dict[str, Any]]) -> dict[str, str]:
+    name = f"{structure.text[0].upper()}{structure.text[1:]} at {model.dt * 1e3:g} ms"
     fits = [p["best_fit_free_run"] for p in validation]
     one_step = np.mean([p["best_fit_one_step"] for p in validation])
-    outside = [p for p in model.poles() if abs(p.value) > _UNSTABLE]
-    if outside or not np.isfinite(fits).all():
+    # What growth a continuous pole's s means per sample.
+    growth = [abs(p.value) if p.sampled else float(np.exp(p.value.real * model.dt)) for p in model.poles()]
+    if max(growth) > _UNSTABLE or not np.isfinite(fits).all():
         text = (
-            f"{name} is unstable (pole at |z| = {max(abs(p.value) for p in outside):.3g}): its free run says "
+            f"{name} is unstable (pole at |z| = {max(growth):.3g}): its free run says "
             f"nothing, one step ahead it fits held-out data to {one_step:.1f} %. Try another sampling time or "
             "order, or a richer drive."
         )

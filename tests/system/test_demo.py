@@ -150,7 +150,7 @@ def read_bag(bag: Path) -> list[Record]:
 
 def test_the_linear_model_is_judged_on_the_record_that_it_was_not_fitted_to(quick: Finished) -> None:
     identified = quick.result("identify")
-    assert identified["schema"] == "hydraulic_sysid.identify/1"
+    assert identified["schema"] == "hydraulic_sysid.identify/2"
     assert [r["name"] for r in identified["estimation"]["records"]] == ["chirp"]
     assert [r["name"] for r in identified["validation"]["records"]] == ["multisine"]
     assert identified["validation"]["best_fit_one_step"] > 60.0

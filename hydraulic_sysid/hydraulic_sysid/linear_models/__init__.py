@@ -5,24 +5,37 @@ from .continuous_fit import fit_transfer_function
 from .errors import IdentificationError
 from .instruments import fit_arx_instruments
 from .model import LinearModel
+from .model_file import read_linear_model, write_linear_model
+from .order_selection import CRITERIA, Candidate, best, try_orders
 from .poles import Pole
 from .series import OFFSETS
 from .state_space import StateSpaceModel
+from .structures import Arx, StateSpace, Structure, TransferFunction
 from .subspace import fit_state_space
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
 
 __all__ = [
-    "OFFSETS",
     "ArxModel",
     "ArxOrder",
+    "fit_arx",
+    "fit_transfer_function",
     "IdentificationError",
+    "fit_arx_instruments",
     "LinearModel",
+    "read_linear_model",
+    "write_linear_model",
+    "CRITERIA",
+    "Candidate",
+    "best",
+    "try_orders",
     "Pole",
+    "OFFSETS",
     "StateSpaceModel",
+    "Arx",
+    "StateSpace",
+    "Structure",
+    "TransferFunction",
+    "fit_state_space",
     "TransferFunctionModel",
     "TransferFunctionOrder",
-    "fit_arx",
-    "fit_arx_instruments",
-    "fit_state_space",
-    "fit_transfer_function",
 ]

@@ -80,6 +80,11 @@ class ArxModel:
     method: str = "least squares"
 
     @property
+    def minimised(self) -> str:
+        """Which error ``loss`` is of."""
+        return "one_step"
+
+    @property
     def parameters(self) -> int:
         """How many values were estimated."""
         return self.standard_errors.size

@@ -24,6 +24,18 @@ class LinearModel(Protocol):
         """Mean squared error, over the estimation data, that the fit has made small."""
 
     @property
+    def minimised(self) -> str:
+        """Which error that is: ``one_step`` or ``free_run``."""
+
+    @property
+    def input_offset(self) -> float:
+        """Mean of the estimation input, where means were subtracted; else 0."""
+
+    @property
+    def output_offset(self) -> float:
+        """Mean of the estimation output, where means were subtracted; else 0."""
+
+    @property
     def samples(self) -> int:
         """How many samples it was estimated from."""
 
@@ -43,3 +55,9 @@ class LinearModel(Protocol):
 
     def poles(self) -> tuple[Pole, ...]:
         """Poles, slowest first."""
+
+    def transfer_function(self) -> tuple[Array, Array]:
+        """Numerator and denominator in descending powers of z or s."""
+
+    def coefficients(self) -> list[tuple[str, float, float]]:
+        """Name, value and standard error (NaN where there is none) of every coefficient."""

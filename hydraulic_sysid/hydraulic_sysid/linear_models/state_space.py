@@ -60,6 +60,11 @@ class StateSpaceModel:
         return self.C.size
 
     @property
+    def minimised(self) -> str:
+        """Which error ``loss`` is of."""
+        return "free_run"
+
+    @property
     def parameters(self) -> int:
         """Values that the transfer function has: n poles, n (+1) of the numerator, and the constant."""
         return 2 * self.order + int(self.direct) + self.constants

@@ -85,6 +85,11 @@ class TransferFunctionModel:
     converged: bool = True
 
     @property
+    def minimised(self) -> str:
+        """Which error ``loss`` is of."""
+        return "free_run"
+
+    @property
     def parameters(self) -> int:
         """How many values of the model were estimated, initial states and the noise model left out."""
         return self.standard_errors.size

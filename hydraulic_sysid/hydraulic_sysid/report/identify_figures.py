@@ -39,18 +39,25 @@ def overlay(result: Result, part: str, record: int) -> go.Figure:
 
 
 def residual_tests(result: Result, part: str, record: int) -> go.Figure | None:
-    """Correlations of the one-step residual with itself and with the input, with their 95 % bounds.
+    """Correlations of the one-step residual with itself and with the input, of the free run's error with the input.
 
-    None where the stretch was too short for the test.
+    With their bounds of 99 %; None where the stretch was too short for the test.
     """
-    tests = result[part]["records"][record]["residual_tests"]
+    entry = result[part]["records"][record]
+    tests, free = entry["residual_tests"], entry["free_run_tests"]
     if tests is None:
         return None
-    lags, bound = tests["lags"], tests["bound"]
-    panels = Panels(1, 2, gap=(0.07, 0.0), titles=["Residual with itself", "Residual with the input"])
-    for panel, key, first in ((0, "autocorrelation", 0), (1, "cross_correlation", -lags)):
-        y = style.values(tests[key])
-        x = np.arange(first, lags + 1, dtype=np.float32)
+    shown = [
+        ("One-step residual with itself", tests, "autocorrelation", "bound"),
+        ("One-step residual with the input", tests, "cross_correlation", "cross_bound"),
+    ]
+    if free is not None:
+        shown.append(("Free run's error with the input", free, "cross_correlation", "cross_bound"))
+    panels = Panels(1, len(shown), gap=(0.06, 0.0), titles=[title for title, *_ in shown])
+    for panel, (_, source, key, limit) in enumerate(shown):
+        lags, bound = source["lags"], source[limit]
+        y = style.values(source[key])
+        x = np.arange(0 if key == "autocorrelation" else -lags, lags + 1, dtype=np.float32)
         expected = (np.abs(y) <= bound) | ((x == 0) & (key == "autocorrelation"))
         colours = [style.ONE_STEP if ok else style.FREE_RUN for ok in expected]
         panels.line(panel, x, y, type="bar", marker={"color": colours})
@@ -60,12 +67,16 @@ def residual_tests(result: Result, part: str, record: int) -> go.Figure | None:
 
 
 def poles(result: Result) -> go.Figure:
-    """Poles of the model in the z plane with the unit circle."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    """Poles of the model: in the z plane with the unit circle, or in the s plane with the imaginary axis."""
     found = result["model"]["poles"]
     panels = Panels(1)
-    circle = style.values(np.cos(angle)), style.values(np.sin(angle))
-    panels.line(0, *circle, hoverinfo="skip", line={"color": style.FLOOR, "width": 1})
+    if result["model"]["transfer_function"]["domain"] == "continuous":
+        reach = max(1e-9, *(abs(p["imaginary"]) for p in found), *(abs(p["real"]) for p in found))
+        border = style.values([0.0, 0.0]), style.values([-1.2 * reach, 1.2 * reach])
+    else:
+        angle = np.linspace(0.0, 2.0 * np.pi, 181)
+        border = style.values(np.cos(angle)), style.values(np.sin(angle))
+    panels.line(0, *border, hoverinfo="skip", line={"color": style.FLOOR, "width": 1})
     panels.line(
         0,
         style.values([p["real"] for p in found]),

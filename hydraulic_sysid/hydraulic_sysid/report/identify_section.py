@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_sysid.display import quantity
+from hydraulic_sysid.display import first_upper, quantity
 
 from . import identify_figures as figures
 from .html import Figures, choice, made_on, section, table, tag, text
 
 Result = dict[str, Any]
+_LISTED = 15  # orders on the page; all of them stand in the JSON
+_EQUATIONS = {
+    "Arx": "y(t) + a₁·y(t−1) + … = b₁·u(t−nk) + … + c + e(t).",
+    "TransferFunction": "(pⁿ + a₁·pⁿ⁻¹ + …)·y = (b₀·pᵐ + …)·u(t − dead time) + c with p = d/dt.",
+    "StateSpace": "Coefficients of the transfer function, (zⁿ + a₁·zⁿ⁻¹ + …)·y = (b₁·zⁿ⁻¹ + …)·u.",
+}
 
 
 def html(result: Result, place: Figures) -> str:
     """The identification's part of the page; its figures are given their places in ``place``."""
-    return _heading(result) + _cards(result) + _fit(result, place) + _model(result, place)
+    return _heading(result) + _cards(result) + _fit(result, place) + _orders(result) + _model(result, place)
 
 
 def _heading(result: Result) -> str:
-    settings, order = result["settings"], result["settings"]["order"]
+    settings = result["settings"]
     kind = f"Identification · {made_on(result)}"
-    name = f"ARX({order['na']}, {order['nb']}, {order['nk']})"
-    title = f"{name} from {settings['input']['channel']} to {settings['output']['channel']}"
+    ends = f"{settings['input']['channel']} to {settings['output']['channel']}"
+    title = f"{first_upper(settings['structure']['text'])} from {ends}"
     names = ", ".join(r["name"] for r in result["estimation"]["records"])
     lead = f"{result['estimation']['samples']} samples at {settings['sampling_time'] * 1e3:g} ms from {names}"
     verdict = result["verdict"]
@@ -32,11 +38,14 @@ def _heading(result: Result) -> str:
 
 def _cards(result: Result) -> str:
     held, square = result["validation"], _square(result)
+    mse = f"mse_{result['model']['minimised']}"
+    words = "one step" if mse == "mse_one_step" else "free run"
     cards = (
         ("Best fit, free run", f"{_figure(held['best_fit_free_run'], '<small> %</small>')}", "on held-out data"),
         ("Best fit, one step", f"{_figure(held['best_fit_one_step'], '<small> %</small>')}", "on held-out data"),
-        ("MSE", f"{held['mse_one_step'] * square[0]:.3g}<small> {square[1]}</small>", "one step, on held-out data"),
-        ("FPE", f"{held['fpe'] * square[0]:.3g}<small> {square[1]}</small>", "expected on fresh data, from the fit"),
+        ("MSE", f"{_figure(held[mse], '', square[0])}<small> {square[1]}</small>", f"{words}, on held-out data"),
+        ("FPE", f"{held['fpe'] * square[0]:.3g}<small> {square[1]}</small>", f"{words}, expected on fresh data"),
+        ("R²", f"{_figure(_mean(held, 'r_squared_free_run'), '', 1.0, 5)}", "free run, on held-out data"),
     )
     return tag(
         "div",
@@ -61,8 +70,9 @@ def _fit(result: Result, place: Figures) -> str:
         for index, record in enumerate(result[part]["records"]):
             tests = place.place(figures.residual_tests(result, part, index))
             note = (
-                "Correlations of the one-step residual; grey is where 95 % of them lie if the model left "
-                "nothing unexplained."
+                "Correlations of the residuals; grey is where 99 % of them lie if the model left nothing unexplained. "
+                "At positive lags the input came first. A free run's error is its own past's: only the input's "
+                "part in it is tested."
                 if tests
                 else "This stretch is too short for residual tests."
             )
@@ -73,14 +83,16 @@ def _fit(result: Result, place: Figures) -> str:
     rows = [
         [
             text(r["name"]), word, str(r["samples"]), _figure(r["best_fit_free_run"], " %"),
-            _figure(r["best_fit_one_step"], " %"), _figure(r["mse_free_run"], "", factor),
-            _figure(r["mse_one_step"], "", factor), quantity(r["noise"], output),
+            _figure(r["best_fit_one_step"], " %"), _figure(r["r_squared_free_run"], "", 1.0, 5),
+            _figure(r["r_squared_one_step"], "", 1.0, 5), _figure(r["mse_free_run"], "", factor),
+            _figure(r["mse_one_step"], "", factor), quantity(r["noise"], output), _outside(r["residual_tests"]),
         ]
         for part, word in (("validation", "held out"), ("estimation", "fitted"))
         for r in result[part]["records"]
     ]  # fmt: skip
-    head = ["Record", "Data", "Samples", "Best fit, free run", "one step", f"MSE, free run [{unit}]",
-            f"one step [{unit}]", "Noise of the sensor"]  # fmt: skip
+    head = ["Record", "Data", "Samples", "Best fit, free run", "one step", "R², free run", "one step",
+            f"MSE, free run [{unit}]", f"one step [{unit}]", "Noise of the sensor",
+            "Lags outside, itself / input"]  # fmt: skip
     lead = (
         "Best fit 100·(1 − ‖y − ŷ‖/‖y − ȳ‖). Free run: on the input alone, the initial state fitted. One step: "
         "from measured outputs. Drag to zoom."
@@ -88,20 +100,61 @@ def _fit(result: Result, place: Figures) -> str:
     return section("Measured and identified", lead, table(head, rows) + tag("div", choice("record", options), "gap"))
 
 
-def _figure(value: float | None, unit: str, factor: float = 1.0) -> str:
+def _figure(value: float | None, unit: str, factor: float = 1.0, digits: int = 3) -> str:
     """A fit in percent or an error; a dash where an unstable model has none."""
-    if value is None:
+    if value is None or value != value:
         return "–"
-    return f"{value:.2f}{unit}".replace("-", "−") if unit else f"{value * factor:.3g}"
+    return f"{value:.2f}{unit}".replace("-", "−") if unit else f"{value * factor:.{digits}g}".replace("-", "−")
+
+
+def _mean(part: Result, key: str) -> float | None:
+    values = [r[key] for r in part["records"]]
+    return None if any(v is None or v != v for v in values) else sum(values) / len(values)
+
+
+def _outside(tests: Result | None) -> str:
+    """Shares of lags beyond the 99 % bounds."""
+    if tests is None:
+        return "–"
+    return " / ".join(f"{100.0 * tests['outside'][key]:.0f} %" for key in ("autocorrelation", "cross_correlation"))
+
+
+def _orders(result: Result) -> str:
+    """The table of orders tried, the best by each criterion first; nothing where the order was given."""
+    tried = result["orders"]
+    if not tried:
+        return ""
+    factor, unit = _square(result)
+    chosen = result["settings"]["select"]
+    by_choice = sorted(tried, key=lambda row: (row[chosen] is None, row[chosen] or 0.0))
+    listed = [row for row in by_choice if row["best_by"]] + [row for row in by_choice if not row["best_by"]]
+    rows = [
+        [
+            text(row["text"]), str(row["parameters"]), *(_figure(row[key], "", factor) for key in ("loss", "fpe")),
+            *(_figure(row[key], "", 1.0, 6) for key in ("aic", "bic")), _figure(row["cv"], "", factor),
+            text(", ".join(name.upper() for name in row["best_by"])),
+        ]
+        for row in listed[:_LISTED]
+    ]  # fmt: skip
+    head = ["Structure", "Parameters", f"Loss [{unit}]", f"FPE [{unit}]", "AIC", "BIC",
+            f"Cross-validation, free run [{unit}]", "Best by"]  # fmt: skip
+    lead = (
+        f"{len(tried)} orders were tried on the estimation data; {chosen.upper()} chose. Shown are the best by each "
+        f"criterion and the next best by {chosen.upper()}."
+    )
+    return section("Order", lead, table(head, rows))
 
 
 def _model(result: Result, place: Figures) -> str:
     model = result["model"]
-    rows = [[text(c["name"]), f"{c['value']:.6g}", f"{c['standard_error']:.2g}"] for c in model["coefficients"]]
+    continuous = model["transfer_function"]["domain"] == "continuous"
+    rows = [
+        [text(c["name"]), f"{c['value']:.6g}".replace("-", "−"), _figure(c["standard_error"], "", 1.0, 2)]
+        for c in model["coefficients"]
+    ]
     poles = [
         [
-            f"{p['real']:.5f}"
-            + (f" {'+' if p['imaginary'] > 0 else '−'} {abs(p['imaginary']):.5f}i" if p["imaginary"] else ""),
+            _complex(p),
             f"{p['natural_frequency_hz']:.3g} Hz",
             f"{p['damping']:.2f}",
             "yes" if p["stable"] else "no",
@@ -111,9 +164,15 @@ def _model(result: Result, place: Figures) -> str:
     content = (
         table(["Coefficient", "Value", "Standard error"], rows)
         + tag("h3", "Poles")
-        + table(["z", "Natural frequency", "Damping", "Stable"], poles)
+        + table(["s [1/s]" if continuous else "z", "Natural frequency", "Damping", "Stable"], poles)
     )
-    lead = (
-        "y(t) + a₁·y(t−1) + … = b₁·u(t−nk) + … + c + e(t), by least squares; the transfer function stands in the JSON."
-    )
+    lead = f"{_EQUATIONS[model['type']]} The transfer function stands in linear_model.json, ready for a controller."
     return section("Model", lead, tag("div", tag("div", content) + place.place(figures.poles(result)), "two"))
+
+
+def _complex(pole: Result) -> str:
+    """A pole as text."""
+    whole = f"{pole['real']:.5g}".replace("-", "−")
+    if not pole["imaginary"]:
+        return whole
+    return f"{whole} {'+' if pole['imaginary'] > 0 else '−'} {abs(pole['imaginary']):.5g}i"

@@ -1,8 +1,9 @@
-"""Identify a linear ARX model from records and try it on held-out data.
+"""Identify a linear model from records and try it on held-out data.
 
-Least squares at one sampling time; best fit in free run and one step ahead, mean squared error and final
-prediction error, on data that the fit has not seen. Writes identify.json and a page to look at (report.html)
-into a folder.
+ARX by least squares or instrumental variables, a continuous-time transfer function by output error, or state space by
+a subspace method, of a given order or of one that a criterion chooses; best fit in free run and one step ahead, mean
+squared error, final prediction error and residual tests, on data that the fit has not seen. Writes identify.json, the
+model itself (linear_model.json) and a page to look at (report.html) into a folder.
 """
 
 from __future__ import annotations
@@ -17,16 +18,32 @@ from rich.table import Table
 
 from hydraulic_sysid import cli, identification, results
 from hydraulic_sysid.display import SHOWN, number
-from hydraulic_sysid.linear_models import OFFSETS, ArxOrder, IdentificationError
+from hydraulic_sysid.linear_models import (
+    CRITERIA,
+    OFFSETS,
+    Arx,
+    ArxOrder,
+    IdentificationError,
+    StateSpace,
+    Structure,
+    TransferFunction,
+    TransferFunctionOrder,
+    write_linear_model,
+)
+from hydraulic_sysid.linear_models.model_file import check_place
 from hydraulic_sysid.records import read_all
 
 from .compare import add_folder_options, add_window_option, read_window, summary_json
 
+MODEL_FILE = "linear_model.json"
 EPILOG = """\
 examples:
   python -m hydraulic_sysid identify --record runs/bag --holdout 0.2 --out runs/bag-identified
   python -m hydraulic_sysid identify --record a.csv.gz --holdout-record b.csv.gz --order 3 3 1 --out runs/arx
+  python -m hydraulic_sysid identify --record runs/bag --model tf --poles 3 --holdout 0.5 --out runs/tf
+  python -m hydraulic_sysid identify --record runs/bag --order 5 5 3 --select bic --out runs/chosen
 """
+MODELS = ("arx", "iv", "tf", "ss")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -35,10 +52,27 @@ def main(argv: list[str] | None = None) -> int:
     cli.add_record_options(parser)
     add_window_option(parser)
     parser.add_argument(
-        "--order", metavar=("NA", "NB", "NK"), type=int, nargs=3, default=(3, 3, 1), help="ARX order (default 3 3 1)"
+        "--model",
+        choices=MODELS,
+        default="arx",
+        help="arx (default), iv: ARX by instrumental variables, tf: continuous transfer function, ss: state space",
     )
     parser.add_argument(
-        "--sampling-time", metavar="SECONDS", type=float, default=0.05, help="of the model (default 0.05)"
+        "--order", metavar=("NA", "NB", "NK"), type=int, nargs=3, default=(3, 3, 1), help="of arx, iv (default 3 3 1)"
+    )
+    parser.add_argument("--poles", metavar="N", type=int, default=3, help="of tf (default 3)")
+    parser.add_argument("--zeros", metavar="N", type=int, default=0, help="of tf (default 0)")
+    parser.add_argument("--integrator", action="store_true", help="tf: one of the poles is 0")
+    parser.add_argument("--delay", metavar="SECONDS", type=float, default=0.0, help="tf: dead time (default 0)")
+    parser.add_argument("--states", metavar="N", type=int, default=3, help="of ss (default 3)")
+    parser.add_argument(
+        "--select", choices=CRITERIA, help="choose the order up to the one given: by FPE, AIC, BIC or cross-validation"
+    )
+    parser.add_argument(
+        "--sampling-time",
+        metavar="SECONDS",
+        type=float,
+        help="of the model (default 0.05 or the records' own where that is longer; tf: the records' own)",
     )
     held = parser.add_mutually_exclusive_group()
     held.add_argument(
@@ -56,18 +90,23 @@ def main(argv: list[str] | None = None) -> int:
 
 def _identify(options: argparse.Namespace) -> int:
     results.check_target(options.out, "identify")
+    check_place(options.out / MODEL_FILE)
+    structure = _structure(options)
+    records = read_window(options)
+    held_out = read_all(options.holdout_record, options.columns) if options.holdout_record else None
+    own = max(r.dt for r in [*records, *(held_out or [])])
     settings = identification.Settings(
-        order=ArxOrder(*options.order),
-        sampling_time=options.sampling_time,
+        structure=structure,
+        sampling_time=options.sampling_time or (own if options.model == "tf" else max(0.05, own)),
         holdout=options.holdout,
         offsets=options.offsets,
+        select=options.select,
         input=options.input,
         output=options.output,
     )
-    records = read_window(options)
-    held_out = read_all(options.holdout_record, options.columns) if options.holdout_record else None
-    result = identification.identify(records, held_out, settings)
+    result, model = identification.identify_model(records, held_out, settings)
     results.write_result(options.out, result)
+    path = write_linear_model(options.out / MODEL_FILE, model, **identification.about(result))
     from hydraulic_sysid.report import write_page
 
     page = write_page(options.out, results.read_folder(options.out))
@@ -75,8 +114,16 @@ def _identify(options: argparse.Namespace) -> int:
         print(summary_json(result, ("traces",)))
     else:
         _print(result, Console(file=sys.stdout, highlight=False, markup=False))
-        print(f"\n{page}")
+        print(f"\n{path}\n{page}")
     return cli.OK
+
+
+def _structure(options: argparse.Namespace) -> Structure:
+    if options.model in ("arx", "iv"):
+        return Arx(ArxOrder(*options.order), options.model == "iv")
+    if options.model == "tf":
+        return TransferFunction(TransferFunctionOrder(options.poles, options.zeros, options.integrator), options.delay)
+    return StateSpace(options.states)
 
 
 def _print(result: dict[str, Any], console: Console) -> None:
@@ -95,6 +142,8 @@ def _print(result: dict[str, Any], console: Console) -> None:
         table.add_section()
     console.print(table)
     console.print(result["verdict"]["text"])
+    if result["orders"]:
+        console.print(f"{result['settings']['select'].upper()} chose it among {len(result['orders'])} orders")
     console.print(
         f"final prediction error {number(result['validation']['fpe'] * factor**2)} {unit}² "
         "(what is expected on fresh data)"
