@@ -129,8 +129,8 @@ def _structure(options: argparse.Namespace) -> Structure:
 def _print(result: dict[str, Any], console: Console) -> None:
     own = result["settings"]["output"]["unit"]
     factor, unit = SHOWN.get(own, (1.0, own))
-    table = Table()
-    for title in ("record", "data", "samples", "best fit, free run", "best fit, one step", f"MSE, one step, {unit}²"):
+    table = Table(title="Best fit in free run and one step ahead", title_justify="left")
+    for title in ("record", "data", "samples", "free run", "one step", f"MSE, one step, {unit}²"):
         left = title in ("record", "data")
         table.add_column(title, justify="left" if left else "right", no_wrap=left)
     for part, word in (("validation", "held out"), ("estimation", "fitted")):
