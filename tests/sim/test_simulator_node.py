@@ -133,3 +133,26 @@ def test_the_diagnostics_name_the_model(start: Any, client: Any, wait_until: Any
     health = client.diagnostics()
     start()
     wait_until(lambda: health["model"] == MODEL and "coulomb_friction" in health["effects"], "the model's name")
+
+
+def test_effects_can_be_switched_on_and_off_while_it_runs(start: Any, client: Any, wait_until: Any) -> None:
+    health, states = client.diagnostics(), client.collect("state")
+    start("model:=moog_mcr_m_1002_bench")
+    client.source("hand", 0.3)
+    wait_until(lambda: len(states) > 200 and states[-1].velocity[0] > 5e-3, "the piston to move")
+    assert set_parameter(client, "extra_effects", "{valve_deadband: {width: 0.05}, supply_droop: }").successful
+    wait_until(lambda: abs(states[-1].velocity[0]) < 1e-3, "the piston to stand within the dead band")
+    wait_until(lambda: "valve_deadband, supply_droop" in health["effects"], "the effects in the diagnostics")
+    for text, complaint in (
+        ("{warp_drive: }", "warp_drive"),
+        ("{valve_deadband: {width: 9.0}}", "width"),
+        ("{coulomb_friction: }", "own effects"),
+        ("[valve_deadband]", "mapping"),
+        ("{valve_deadband: {width: wide}}", "number"),
+        ("{", "YAML"),
+    ):
+        refused = set_parameter(client, "extra_effects", text)
+        assert not refused.successful and complaint in refused.reason, text
+    assert set_parameter(client, "extra_effects", "").successful
+    wait_until(lambda: states[-1].velocity[0] > 5e-3, "the piston to move again")
+    wait_until(lambda: "deadband" not in health["effects"], "the effects gone from the diagnostics")

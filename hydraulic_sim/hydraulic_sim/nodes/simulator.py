@@ -14,6 +14,7 @@ from hydraulic_interfaces.plant_backend import BackendError, PlantBackend
 from hydraulic_interfaces.samples import NAN, PlantSample
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
+from hydraulic_sim.nodes._extra_effects import switched
 from hydraulic_sim.nodes._sensors import Sensor
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.trial_drive import trial_drive
@@ -37,6 +38,7 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("noise_seed", 0, "seed of all sensor noise", "", 0, 2**31 - 1),
     ParameterSpec("publish_clock", False, "publish /clock: everybody else follows with use_sim_time"),
     ParameterSpec("real_time_factor", 1.0, "simulated per wall second, with publish_clock", "1", 0.01, 100.0),
+    ParameterSpec("extra_effects", "", "beside the model's own, YAML: {valve_deadband: {width: 0.03}}", live=True),
     *SENSORS,
 )
 
@@ -49,6 +51,7 @@ class Simulator(PlantBackend):
 
     def __init__(self) -> None:
         self._model: Model | None = None
+        self._extra: tuple[str, ...] = ()
 
     def parameters(self) -> Sequence[ParameterSpec]:
         """See `PlantBackend.parameters`."""
@@ -76,12 +79,16 @@ class Simulator(PlantBackend):
         self._position, self._velocity, *self._pressures = (Sensor(seed) for seed in seeds)
         for spec in SENSORS:
             self.set_parameter(spec.name, values[spec.name])
-        self._take_model(model)
+        self._extra = ()
+        self._switch_effects(values["extra_effects"])
         keys = model.keys()
         return [_model_parameter(model, key) for key in keys]
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """A sensor's noise or resolution, or a parameter of the model; effective from the next step on."""
+        """A sensor's noise or resolution, the extra effects, or a parameter of the model; from the next step on."""
+        if name == "extra_effects":
+            self._switch_effects(value)
+            return
         if name.startswith(MODEL_PREFIX):
             key = name.removeprefix(MODEL_PREFIX)
             self._live.set_value(key, value)
@@ -124,6 +131,11 @@ class Simulator(PlantBackend):
         if self._model is None:
             return {}
         return {"model": self._model.name, "effects": ", ".join(self._model.effects)}
+
+    def _switch_effects(self, text: str) -> None:
+        model, self._extra = switched(self._live.plant.model, self._extra, text)
+        self._live.replace_model(model)
+        self._take_model(model)
 
     def _take_model(self, model: Model) -> None:
         self._model = model
