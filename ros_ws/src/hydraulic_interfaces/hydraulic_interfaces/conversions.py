@@ -218,6 +218,18 @@ class CommandEncoder:
         return self._template.fill(stamp_ns, (drive,))
 
 
+class ReferenceEncoder:
+    """Serialised `reference` messages, equal in content to those of `reference_to_message`."""
+
+    def __init__(self) -> None:
+        x, v = _MARKS[:2]
+        self._template = _Template(reference_to_message(Reference(0, x, v)), (x,), (v,))
+
+    def __call__(self, stamp_ns: int, position: float, velocity: float) -> bytes:
+        """CDR bytes for `Publisher.publish`."""
+        return self._template.fill(stamp_ns, (position,), (velocity,))
+
+
 class PressureEncoder:
     """Serialised pressure messages, equal in content to those of `pressure_to_message`."""
 
