@@ -45,6 +45,12 @@ def quantity(value: float, unit: str) -> str:
     return f"{number(value * scale)} {name}"
 
 
+def span(low: float, high: float, unit: str) -> str:
+    """Two numbers with one unit: ``−546 … 579 mm``."""
+    scale, name = SHOWN.get(unit, (1.0, unit))
+    return f"{number(low * scale)} … {number(high * scale)} {name}"
+
+
 def percent(share: float | None) -> str:
     """A share in percent to one digit, with a true minus sign; a dash where there is none."""
     return "–" if share is None or share != share else f"{100.0 * share:.1f} %".replace("-", "−")

@@ -74,6 +74,7 @@ def document(found: Bandwidth, source: dict[str, Any], coherence: np.ndarray | N
     return {
         **heading("bandwidth"),
         "verdict": {"level": "explained", "text": text},
+        "title": f"Bandwidth of {source['name']}",
         "model": {"name": source["name"]},
         "source": source,
         "position_bandwidth": found.position,

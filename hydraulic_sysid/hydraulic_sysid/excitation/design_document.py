@@ -33,6 +33,7 @@ def document(
     return {
         **heading("design"),
         "verdict": {"level": "explained", "text": text},
+        "title": f"Excitation design for {first.prediction.model}",
         "model": {"name": first.prediction.model},
         "signal": named,
         "bandwidth": bandwidth,

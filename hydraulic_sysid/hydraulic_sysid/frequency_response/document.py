@@ -68,6 +68,7 @@ def respond(records: Sequence[Record], settings: Settings | None = None) -> dict
     return {
         **heading("frequency_response"),
         "verdict": {"level": level, "text": text},
+        "title": f"Frequency response of {records[0].name}",
         "model": {"name": ", ".join(r.name for r in records)},
         "method": method,
         "settings": {
@@ -192,9 +193,7 @@ def _verdict(content: dict[str, Any], method: str) -> tuple[str, str]:
             return "No frequency has a coherence of 0.9: drive and output hardly belong together.", "off"
         f = np.asarray(content["welch"]["frequency"])[trusted]
         text = f"Coherence of 0.9 and more from {number(f.min())} to {number(f.max())} Hz"
-        return f"{text} ({100.0 * trusted.mean():.0f} % of the lines). Noise and distortion stand in it together.", (
-            "explained" if trusted.mean() > 0.5 else "close"
-        )
+        return f"{text}. Noise and distortion lower it alike; a multisine of whole periods tells them apart.", "close"
     levels = content["levels"]
     parts = [
         f"{word} distortion {_words(levels[key])}"

@@ -1,0 +1,143 @@
+"""Design an excitation from the actuator's bandwidth, as large as its limits allow on the model.
+
+The amplitude is the largest at which neither drive, travel, velocity nor pressures leave their limits in a rehearsal on
+the model. Writes the plan, with what the model does under it, for the excitation node; design.json and a page.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from hydraulic_sim.errors import ModelError, SimulationError
+from hydraulic_sim.model_file import Model, load_model
+from hydraulic_sysid import cli, results
+from hydraulic_sysid.bandwidth import from_model
+from hydraulic_sysid.display import quantity, span
+from hydraulic_sysid.excitation import ExcitationError, save_plan
+from hydraulic_sysid.excitation.amplitude import Limits, Sized, largest
+from hydraulic_sysid.excitation.design import SIGNALS, Wish, propose
+from hydraulic_sysid.excitation.design_document import document
+
+from .compare import add_folder_options, summary_json
+
+EPILOG = """\
+examples:
+  python -m hydraulic_sysid design chirp --model moog_mcr_m_1002_bench --out runs/design
+  python -m hydraulic_sysid design odd_random_phase_multisine --model my.yaml --realisations 4 --out runs/four
+  python -m hydraulic_sysid design prbs --model my.yaml --band 0.5 20 --duration 30 --out runs/prbs
+
+The plan is played by the excitation node: -p plan:=runs/design/chirp.yaml
+"""
+_LIMITS = {
+    "drive": ("V", "largest drive"),
+    "travel": ("m", "largest distance from the centre"),
+    "velocity": ("m/s", "largest speed"),
+    "pressure_min": ("Pa", "least pressure of a chamber"),
+    "pressure_max": ("Pa", "largest pressure of a chamber"),
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry of the verb; its exit code."""
+    parser = cli.parser("design", __doc__.partition("\n")[0], EPILOG)
+    parser.add_argument("signal", metavar="SIGNAL", choices=tuple(SIGNALS), help=f"one of {', '.join(SIGNALS)}")
+    parser.add_argument("--model", metavar="FILE", required=True, help="model file, or the name of a preset")
+    band = parser.add_mutually_exclusive_group()
+    band.add_argument("--bandwidth", metavar="HZ", type=float, help="of the actuator (default: that of the model)")
+    band.add_argument("--band", metavar=("LOW", "HIGH"), type=float, nargs=2, help="excite this band [Hz] instead")
+    parser.add_argument(
+        "--share", metavar=("LOW", "HIGH"), type=float, nargs=2, default=(0.1, 2.0), help="band over bandwidth (0.1 2)"
+    )
+    parser.add_argument("--duration", metavar="SECONDS", type=float, default=50.0, help="of the signal (default 50)")
+    parser.add_argument("--rate", metavar="HZ", type=float, default=1000.0, help="samples per second (default 1000)")
+    parser.add_argument("--seed", metavar="N", type=int, default=1, help="draws random phases (default 1)")
+    parser.add_argument("--realisations", metavar="N", type=int, default=1, help="plans that differ in the seed")
+    parser.add_argument("--part", metavar="PART", type=float, default=1.0, help="of the largest amplitude (default 1)")
+    parser.add_argument("--centre", metavar="M", type=float, default=0.0, help="around which the piston moves")
+    for name, (unit, what) in _LIMITS.items():
+        option = f"--{name.replace('_', '-')}"
+        parser.add_argument(option, metavar=unit, type=float, help=f"{what} (default: from the model)")
+    add_folder_options(parser)
+    return cli.run(parser, _design, argv, errors=(ModelError, SimulationError, results.ResultError))
+
+
+def _design(options: argparse.Namespace) -> int:
+    results.check_target(options.out, "design")
+    if options.realisations < 1 or not 0.0 < options.part <= 1.0:
+        raise ExcitationError("--realisations is 1 or more, --part above 0 and up to 1")
+    model = load_model(options.model)
+    bandwidth = options.bandwidth
+    if bandwidth is None and options.band is None:
+        bandwidth = from_model(model, options.centre).position
+    low, high = options.band or (options.share[0] * bandwidth, options.share[1] * bandwidth)
+    limits = Limits.of(model, options.centre)
+    limits = replace(limits, **{k: getattr(options, k) for k in _LIMITS if getattr(options, k) is not None})
+    names = [options.signal]
+    if options.realisations > 1:
+        names = [f"{options.signal}_{number}" for number in range(1, options.realisations + 1)]
+    files = [options.out / f"{name}.yaml" for name in names]
+    there = [str(file) for file in files if file.exists()]
+    if there:
+        raise ExcitationError(f"{', '.join(there)} exists; choose another folder (a plan is never overwritten)")
+    sized: list[Sized] = []
+    with Console(stderr=True).status("rehearsing on the model …"):
+        for number, name in enumerate(names):
+            wish = Wish(low, high, options.duration, options.rate, options.seed + number)
+            plan = replace(propose(options.signal, wish), name=name, centre=options.centre)
+            sized.append(largest(plan, model, limits, options.part))
+    if len(sized) > 1:  # realisations of one distribution have one amplitude: the least that any of them allows
+        sized = _alike(sized, model, limits)
+    options.out.mkdir(parents=True, exist_ok=True)
+    for one, file in zip(sized, files, strict=True):
+        save_plan(one.plan, file)
+    result = document(sized, [str(file) for file in files], bandwidth, (low, high), limits)
+    results.write_result(options.out, result)
+    from hydraulic_sysid.report import write_page
+
+    page = write_page(options.out, results.read_folder(options.out))
+    if options.json:
+        print(summary_json(result, ("traces", "spectrum")))
+    else:
+        _print(result, Console(file=sys.stdout, highlight=False, markup=False))
+        print("\n" + "\n".join([*map(str, files), str(page)]))
+    return cli.OK
+
+
+def _alike(sized: list[Sized], model: Model, limits: Limits) -> list[Sized]:
+    """All with the amplitude of the smallest, and with its reason."""
+    least = min(sized, key=lambda one: one.plan.signal.size)
+    found = []
+    for one in sized:
+        capped = largest(one.plan, model, limits, cap=least.plan.signal.size / one.plan.signal.size)
+        assert capped.plan.prediction is not None and least.plan.prediction is not None
+        prediction = replace(capped.plan.prediction, limited_by=least.plan.prediction.limited_by)
+        found.append(replace(capped, plan=replace(capped.plan, prediction=prediction)))
+    return found
+
+
+def _print(result: dict[str, Any], console: Console) -> None:
+    table = Table(title=f"{result['signal']} on {result['model']['name']}, predicted", title_justify="left")
+    table.add_column("plan", no_wrap=True)
+    for title in ("drive", "position", "speed", "pressures"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for plan in result["plans"]:
+        p = plan["prediction"]
+        table.add_row(
+            plan["name"].rpartition("_")[2] if len(result["plans"]) > 1 else plan["name"],
+            f"±{quantity(p['drive_peak'], 'V')}",
+            span(p["position_min"], p["position_max"], "m"),
+            quantity(p["velocity_peak"], "m/s"),
+            span(p["pressure_min"], p["pressure_max"], "Pa"),
+        )
+    console.print(table)
+    console.print(result["verdict"]["text"])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
