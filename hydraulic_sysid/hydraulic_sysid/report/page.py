@@ -11,15 +11,25 @@ from plotly.offline import get_plotlyjs
 
 from hydraulic_sysid.results import PAGE, PAGE_MARK, ResultError, verb_of, write_text
 
-from . import calibrate_section, compare_section, identify_section
+from . import (
+    bandwidth_section,
+    calibrate_section,
+    compare_section,
+    design_section,
+    frequency_response_section,
+    identify_section,
+)
 from .html import Figures, tag, text
 
 Result = dict[str, Any]
 
 # A result's schema chooses how it is shown; a new kind of result adds its section here.
 SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
+    "hydraulic_sysid.bandwidth/1": bandwidth_section.html,
     "hydraulic_sysid.calibrate/1": calibrate_section.html,
     "hydraulic_sysid.compare/1": compare_section.html,
+    "hydraulic_sysid.design/1": design_section.html,
+    "hydraulic_sysid.frequency_response/1": frequency_response_section.html,
     "hydraulic_sysid.identify/1": identify_section.html,
 }
 
@@ -62,6 +72,8 @@ def write_page(folder: Path, results: Sequence[Result]) -> Path:
 
 def _title(results: Sequence[Result]) -> str:
     for result in results:
+        if "title" in result:
+            return str(result["title"])
         if "name" in result["model"]:
             return f"{result['model']['name']} against measurements"
     return "Identified model"
