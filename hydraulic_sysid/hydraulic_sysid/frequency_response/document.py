@@ -175,9 +175,9 @@ def _spectral(record: Record, settings: Settings) -> dict[str, Any]:
 
 
 def _estimate(found: Spectral) -> dict[str, Any]:
-    """At most 600 lines, evenly over the logarithm of the frequency."""
+    """At most 600 of the lines that the drive reaches, evenly over the logarithm of the frequency."""
     keep = np.unique(np.geomspace(1, found.frequency.size, _POINTS).astype(int)) - 1
-    keep = keep[np.isfinite(found.response[keep])]
+    keep = keep[found.played[keep] & np.isfinite(found.response[keep])]
     return {
         "frequency": found.frequency[keep],
         **_curve(found.response[keep]),

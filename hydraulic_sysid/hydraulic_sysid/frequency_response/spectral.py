@@ -25,11 +25,13 @@ Complex = NDArray[np.complex128]
 @dataclass(frozen=True)
 class Spectral:
     """A frequency response over lines: frequency (K,) [Hz], response (K,) [output per input], coherence γ² (K,)
-    between 0 and 1, and the number of independent averages behind each line."""
+    between 0 and 1, power of the drive (K,) relative to its strongest line, and the number of independent averages
+    behind each line."""
 
     frequency: Array
     response: Complex
     coherence: Array
+    drive: Array
     averages: float
 
     @property
@@ -41,9 +43,11 @@ class Spectral:
         safe = np.maximum(self.coherence, 1e-12)
         return np.abs(self.response) * np.sqrt(np.maximum(1.0 - self.coherence, 0.0) / (safe * self.averages))
 
-    def trusted(self, coherence: float = 0.9) -> NDArray[np.bool_]:
-        """Which lines (K,) have at least that coherence."""
-        return self.coherence >= coherence
+    @property
+    def played(self) -> NDArray[np.bool_]:
+        """Which lines (K,) the drive reaches with at least 10⁻⁵ of the power of the strongest; of others the coherence
+        is that of leakage."""
+        return self.drive >= 1e-5
 
 
 def welch(drive: ArrayLike, output: ArrayLike, dt: float, segment: float, *, integrating: bool = True) -> Spectral:
@@ -102,7 +106,7 @@ def _spectral(
         coherence = np.where(keep & (s_yy > 0.0), np.abs(s_uy) ** 2 / (s_uu * s_yy), 0.0)
     if integrating:
         response = response / (np.exp(2j * np.pi * frequency * dt) - 1.0)
-    return Spectral(frequency, response, np.clip(coherence, 0.0, 1.0), averages)
+    return Spectral(frequency, response, np.clip(coherence, 0.0, 1.0), s_uu / s_uu.max(), averages)
 
 
 def _pair(drive: ArrayLike, output: ArrayLike) -> tuple[Array, Array]:
