@@ -1,0 +1,1 @@
+"""Parameter files that `tune` has written for presets."""

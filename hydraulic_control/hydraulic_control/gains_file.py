@@ -1,0 +1,90 @@
+"""Parameter files of the controller: what `tune` writes and the node reads, in the form of ROS parameter files.
+
+    # where the gains come from, as comments
+    /actuator/controller:
+      ros__parameters:
+        controller: npid
+        kp: 150.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.error import YAMLError
+
+from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.parameters import SPECS, check
+from hydraulic_interfaces.contract import CONTROLLER_NODE, absolute
+
+FOLDER = Path(__file__).parent / "gains"
+NODE = absolute(CONTROLLER_NODE)
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the parameter files that come with the package."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def find(name_or_path: str | Path) -> Path:
+    """The file of that path, or the shipped one of that name. Raises `HydraulicControlError` where there is none."""
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    own = FOLDER / f"{name_or_path}.yaml"
+    if str(name_or_path) in shipped():
+        return own
+    raise HydraulicControlError(
+        f"{name_or_path}: no such parameter file; shipped are {', '.join(shipped()) or 'none'}, or give a path"
+    )
+
+
+def load(name_or_path: str | Path) -> dict[str, Any]:
+    """Parameters of the controller in a file, checked; not all need to be there.
+
+    Raises `HydraulicControlError` for a file that is no such file, and for values that are not allowed.
+    """
+    path = find(name_or_path)
+    try:
+        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        raise HydraulicControlError(f"{path}: cannot be read: {error}") from None
+    rows = document.get(NODE, {}).get("ros__parameters") if isinstance(document, dict) else None
+    if not isinstance(rows, dict):
+        raise HydraulicControlError(f"{path}: has no {NODE} with ros__parameters")
+    try:
+        return {name: check(name, value) for name, value in _flat(rows).items() if name not in ("use_sim_time",)}
+    except HydraulicControlError as error:
+        raise HydraulicControlError(f"{path}: {error}") from None
+
+
+def text(values: Mapping[str, Any], remarks: str) -> str:
+    """The file with those values, each with its unit and meaning, after the remarks."""
+    rows = CommentedMap()
+    for name, value in values.items():
+        rows[name] = float(f"{value:.5g}") if isinstance(value, float) else value
+        spec = SPECS[name]
+        rows.yaml_add_eol_comment(f"{spec.unit}; {spec.description}" if spec.unit else spec.description, name)
+    document = CommentedMap({NODE: CommentedMap({"ros__parameters": rows})})
+    document.yaml_set_start_comment(remarks)
+    from io import StringIO
+
+    stream = StringIO()
+    writer = YAML()
+    writer.width = 200
+    writer.dump(document, stream)
+    return stream.getvalue()
+
+
+def _flat(rows: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in rows.items():
+        if isinstance(value, dict):
+            found |= _flat(value, f"{before}{name}.")
+        else:
+            found[f"{before}{name}"] = value
+    return found

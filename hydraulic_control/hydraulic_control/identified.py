@@ -1,0 +1,158 @@
+"""An identified transfer function as a plant of the loop: run at the controller's rate, whatever its own.
+
+A model sampled with a zero-order hold of T is brought to continuous time mode by mode, s = ln(z)/T, which keeps its
+response at its own sampling instants exactly (K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd ed. 1997,
+sec. 2.3). Between them, and above its Nyquist frequency, it knows nothing of the plant.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hydraulic_control.errors import HydraulicControlError
+
+NAN = float("nan")
+_APART = 1e-9
+
+
+@dataclass(frozen=True)
+class IdentifiedModel:
+    """Modes of a transfer function from the drive [V] to the position [m]: y = Σ c/(s − p)·u + d·u, ``delay`` [s] late.
+
+    ``poles`` (n,) [rad/s], ``residues`` (n,), ``direct`` [m/V]; ``highest`` [rad/s] is the frequency up to which it
+    holds (infinite for a continuous model); ``name`` says where it is from.
+    """
+
+    name: str
+    poles: NDArray[np.complex128]
+    residues: NDArray[np.complex128]
+    direct: float
+    delay: float
+    highest: float
+
+    def response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """Frequency response [m/V] at ``omega`` [rad/s], (N,)."""
+        s = 1j * np.atleast_1d(np.asarray(omega, dtype=float))[:, None]
+        # A real pole at z < 0 becomes a complex one alone; with its conjugate the response stays that of a real system.
+        both = self.residues / (s - self.poles) + self.residues.conj() / (s - self.poles.conj())
+        return (0.5 * both.sum(axis=1) + self.direct) * np.exp(-s[:, 0] * self.delay)
+
+    @property
+    def velocity_gain(self) -> float:
+        """Speed per volt [m/(s·V)] of the slowest mode, which is the integrator of an actuator."""
+        slowest = int(np.argmin(np.abs(self.poles)))
+        return float(self.residues[slowest].real)
+
+    def named(self, name: str) -> IdentifiedModel:
+        """The same under another name."""
+        return replace(self, name=name)
+
+    def plant(self) -> IdentifiedPlant:
+        """A plant at rest at 0 m."""
+        return IdentifiedPlant(self)
+
+
+class IdentifiedPlant:
+    """A running identified model; it has no chambers, so the force is not a number."""
+
+    def __init__(self, model: IdentifiedModel, drive_limit: float = 10.0) -> None:
+        self._model, self._limit = model, drive_limit
+        self._states = np.zeros(len(model.poles), dtype=complex)
+        self._dt = 0.0
+        self._late: deque[float] = deque()
+        self.true_position = 0.0
+
+    def step(self, drive: float, dt: float) -> tuple[float, float, float]:
+        """See `simulation.LoopPlant`."""
+        if dt != self._dt:
+            self._prepare(dt)
+        applied = min(max(drive, -self._limit), self._limit)
+        self._late.append(applied)
+        acting = self._late.popleft()
+        position = float((self._model.residues @ self._states).real) + self._model.direct * acting
+        self._states = self._turn * self._states + self._push * acting
+        self.true_position = position
+        return position, NAN, applied
+
+    def _prepare(self, dt: float) -> None:
+        p = self._model.poles
+        self._turn = np.exp(p * dt)
+        fast = np.abs(p) * dt > _APART
+        self._push = np.where(fast, (self._turn - 1.0) / np.where(fast, p, 1.0), dt)
+        self._late = deque([0.0] * round(self._model.delay / dt))
+        self._dt = dt
+
+
+def from_coefficients(
+    numerator: ArrayLike, denominator: ArrayLike, sampling_time: float | None, delay: float = 0.0, name: str = "model"
+) -> IdentifiedModel:
+    """Model of a transfer function in descending powers of z (sampled every ``sampling_time`` [s]), or of s where that
+    is None or 0.
+
+    Raises `HydraulicControlError` for coefficients that are no proper transfer function, and for repeated poles.
+    """
+    num, den = (np.trim_zeros(np.atleast_1d(np.asarray(c, dtype=float)), "f") for c in (numerator, denominator))
+    if not (len(num) and len(den) >= 2 and len(num) <= len(den) and np.isfinite([*num, *den]).all()):
+        raise HydraulicControlError(
+            f"{name}: numerator {list(num)} over denominator {list(den)} is no proper transfer function with poles"
+        )
+    if not (math.isfinite(delay) and delay >= 0.0):
+        raise HydraulicControlError(f"{name}: the delay is {delay} s; it must not be negative")
+    poles = np.roots(den).astype(complex)
+    distances = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(len(poles), np.inf))
+    if distances.min() < _APART * max(1.0, float(np.abs(poles).max())):
+        raise HydraulicControlError(f"{name}: has a repeated pole ({poles}); only simple poles can be taken apart")
+    direct = float(num[0] / den[0]) if len(num) == len(den) else 0.0
+    residues = (np.polyval(num, poles) / np.polyval(np.polyder(den), poles)).astype(complex)
+    if not sampling_time:
+        return IdentifiedModel(name, poles, residues, direct, delay, math.inf)
+    poles, residues = _continuous(poles, residues, sampling_time, name)
+    return IdentifiedModel(name, poles, residues, direct, delay, math.pi / sampling_time)
+
+
+def _continuous(z: NDArray, residues: NDArray, period: float, name: str) -> tuple[NDArray, NDArray]:
+    """Modes r/(q − z) under a zero-order hold as modes c/(s − p): p = ln(z)/T, c = r·p/(z − 1)."""
+    # A pole at z = 0 is a pure delay of one sample, which has no logarithm: it decays within a thousandth of one.
+    z = np.where(np.abs(z) < 1e-12, np.exp(-1000.0), z)
+    s = np.log(z) / period
+    slow = np.abs(z - 1.0) < _APART
+    gain = np.where(slow, 1.0 / period, s / np.where(slow, 1.0, z - 1.0))
+    if not np.isfinite(period) or period < 0.0:
+        raise HydraulicControlError(f"{name}: the sampling time is {period} s; it must be positive")
+    return s, residues * gain
+
+
+def load_identified(path: Path | str) -> IdentifiedModel:
+    """Model in a result of ``hydraulic_sysid identify``, or in a JSON file with numerator, denominator,
+    sampling_time [s] (null: continuous) and, if it has one, delay [s].
+
+    Raises `HydraulicControlError` for a file that cannot be read or holds no transfer function from V to m.
+    """
+    file = Path(path)
+    try:
+        document: Any = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise HydraulicControlError(f"{file}: cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise HydraulicControlError(f"{file}: not a JSON document ({error})") from None
+    settings = document.get("settings", {}) if isinstance(document, dict) else {}
+    for side, unit in (("input", "V"), ("output", "m")):
+        found = settings.get(side, {}).get("unit", unit) if isinstance(settings, dict) else unit
+        if found != unit:
+            raise HydraulicControlError(f"{file}: its {side} is in {found}; a position loop needs one in {unit}")
+    held = document.get("model", document) if isinstance(document, dict) else {}
+    form = held.get("transfer_function", held) if isinstance(held, dict) else {}
+    try:
+        return from_coefficients(
+            form["numerator"], form["denominator"], form.get("sampling_time"), form.get("delay") or 0.0, file.stem
+        )
+    except (KeyError, TypeError) as error:
+        raise HydraulicControlError(f"{file}: holds no transfer function ({error})") from None

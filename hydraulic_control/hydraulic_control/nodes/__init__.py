@@ -1,0 +1,1 @@
+"""Nodes of this package; the only place in it that knows ROS."""

@@ -1,0 +1,63 @@
+"""The controller's row on `/diagnostics`."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from hydraulic_control.session import ControlSession
+from hydraulic_interfaces.contract import CONTROLLER_NODE, absolute
+from hydraulic_interfaces.conversions import to_time
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+
+class ControllerHealth:
+    """Builds the diagnostics; a fault raises the level in the message after it."""
+
+    def __init__(self, session: ControlSession) -> None:
+        self._session = session
+        self._seen = 0
+        self._answered = 0
+        self._then_ns = 0
+        self.latencies: deque[float] = deque(maxlen=2000)
+
+    def message(self, state: str, now_ns: int) -> DiagnosticArray:
+        """The row at `now_ns`; `state` is the lifecycle state."""
+        session = self._session
+        faults = sum(session.faults.values())
+        more, self._seen = faults - self._seen, faults
+        elapsed = max((now_ns - self._then_ns) * 1e-9, 1e-9)
+        rate, self._then_ns = (session.answered - self._answered) / elapsed, now_ns
+        self._answered = session.answered
+        late = sorted(self.latencies)
+        values: dict[str, object] = {
+            "lifecycle": state,
+            "controller": session.controller.values["controller"],
+            "drive_V": f"{session.controller.drive:.4f}",
+            "error_m": f"{session.error:.6f}",
+            "reference_m": "none" if session.reference is None else f"{session.reference.position:.6f}",
+            "answered": session.answered,
+            "rate_Hz": f"{rate:.1f}",
+            "last_trouble": session.trouble,
+            **{fault.name.lower(): count for fault, count in session.faults.items()},
+        }
+        if late:
+            values["latency_p50_ms"] = f"{late[len(late) // 2] * 1e3:.4f}"
+            values["latency_p99_ms"] = f"{late[int(0.99 * (len(late) - 1))] * 1e3:.4f}"
+        level, text = OK, f"{state}, {rate:.0f} Hz"
+        if more:
+            level, text = WARN, session.trouble
+        elif state == "active" and rate == 0.0:
+            level, text = ERROR, "no state can be answered: drive is 0 V"
+        row = DiagnosticStatus(
+            level=level,
+            name=f"{absolute(CONTROLLER_NODE)}: loop",
+            message=text,
+            hardware_id="controller",
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        array = DiagnosticArray(status=[row])
+        array.header.stamp = to_time(now_ns)
+        return array

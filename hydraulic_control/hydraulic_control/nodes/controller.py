@@ -1,0 +1,183 @@
+"""Node `/actuator/controller`: a managed node that closes the position loop, one command for every state.
+
+It follows the topic `reference`; until one comes it holds the position that it found when it was activated. A command
+carries the stamp of the state it answers. The gains are live parameters; changing one makes no bump in the drive. A
+state that is too old or cannot be believed is answered with 0 V and a diagnostic.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+
+from hydraulic_control import gains_file
+from hydraulic_control.controller import Controller
+from hydraulic_control.nodes._controller_health import ControllerHealth
+from hydraulic_control.parameters import LAW, SPECS, check
+from hydraulic_control.session import ControlSession
+from hydraulic_interfaces.contract import CONTROLLER_NODE, NAMESPACE
+from hydraulic_interfaces.conversions import (
+    CommandEncoder,
+    MessageError,
+    reference_from_message,
+    sample_from_messages,
+)
+from hydraulic_interfaces.nodes.guarded_lifecycle import guard_transitions
+from hydraulic_interfaces.nodes.parameters import ParameterTable
+from hydraulic_interfaces.nodes.serving import Served, serve
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_interfaces.qos import profile
+
+SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+HEALTH_PERIOD_S = 0.5
+STATE_DEPTH = 10  # a node that cannot keep up must skip some, not fall behind
+
+SAFETY: tuple[ParameterSpec, ...] = (
+    ParameterSpec("age_limit", 0.02, "age of a state, or silence, that gives 0 V", "s", 1e-3, 1.0, live=True),
+    ParameterSpec("reference_timeout", 0.1, "age of a reference from which it stands", "s", 1e-3, 1e3, live=True),
+    ParameterSpec("travel", 0.7, "largest reference to either side", "m", 0.0, 100.0, live=True),
+    ParameterSpec("speed_limit", 20.0, "a position that leaps faster is not believed", "m/s", 0.1, 1e6, live=True),
+    ParameterSpec("applied_tolerance", 0.5, "between applied drive and commands; 0: any", "V", 0.0, 20.0, live=True),
+)
+PARAMETERS: tuple[ParameterSpec, ...] = (
+    ParameterSpec("autostart", False, "configure and activate at start"),
+    ParameterSpec("gains", "", f"parameter file of the gains, or one of {', '.join(gains_file.shipped())}; ''"),
+    *SAFETY,
+    *LAW,
+)
+
+
+class ControllerNode(Served, LifecycleNode):
+    """Parameters, topics, lifecycle and diagnostics around a `ControlSession`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(CONTROLLER_NODE, namespace=NAMESPACE, **options)
+        guard_transitions(self)
+        self._state = "unconfigured"
+        self._loaded = ""
+        self._session = ControlSession(Controller())
+        self._table = ParameterTable(self, PARAMETERS, self._apply, lambda: self._state != "unconfigured")
+        for spec in (*SAFETY, *LAW):
+            self._apply(spec.name, self._table[spec.name])
+        self._health = ControllerHealth(self._session)
+        self._encode = CommandEncoder(CONTROLLER_NODE)
+        self._command = self.create_publisher(JointState, "command", profile("command"))
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
+        self._heard = self._reported = time.monotonic()
+        self._stamp_ns = 0
+        self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
+        self.create_subscription(JointState, "reference", self._on_reference, profile("reference", STATE_DEPTH))
+        if self._table["autostart"]:
+            self._starter = self.create_timer(0.0, self._autostart)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Read the gains and compile the step; FAILURE with a log line if that cannot be done."""
+        try:
+            self._load(self._table["gains"])
+            # Compiled, or read from numba's cache, before the first state waits for it.
+            Controller(self._session.controller.values).step(1e-3, 0.0, 0.0, 0.0)
+        except ValueError as error:
+            self.get_logger().error(f"cannot configure: {error}")
+            return FAILURE
+        self._table.warn_of_unknown()
+        self._state = "inactive"
+        return SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Hold the position that the next state reports, until a reference comes."""
+        self._session.begin()
+        self._heard, self._state = time.monotonic(), "active"
+        return SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """0 V, then silence."""
+        self._state = "inactive"
+        self._session.begin()
+        self._command.publish(self._encode(self._stamp_ns, 0.0))
+        return SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let everything be set again."""
+        self._state = "unconfigured"
+        return SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """As on_deactivate, from whatever state."""
+        if self._state == "active":
+            self.on_deactivate(state)
+        self._state = "finalized"
+        return SUCCESS
+
+    def watch(self) -> None:
+        """What must happen without a message: notice silence, report health."""
+        now = time.monotonic()
+        if self._state == "active" and self._session.silence(age := now - self._heard):
+            self._command.publish(self._encode(self._stamp_ns + round(age * 1e9), 0.0))
+            self._reported = 0.0
+        if now - self._reported > HEALTH_PERIOD_S:
+            self._reported = now
+            self._diagnostics.publish(self._health.message(self._state, self.get_clock().now().nanoseconds))
+
+    def close(self) -> None:
+        """0 V if it was in command, and time for the message to leave."""
+        if self._state == "active":
+            self.on_deactivate(None)  # type: ignore[arg-type]
+            self._command.wait_for_all_acked(Duration(seconds=1))
+
+    def _on_state(self, message: JointState) -> None:
+        if self._state != "active":
+            return
+        try:
+            sample = sample_from_messages(message)
+        except MessageError as error:
+            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+            return
+        clock = self.get_clock()
+        drive = self._session.answer(sample, clock.now().nanoseconds)
+        if drive is not None:
+            self._command.publish(self._encode(sample.stamp_ns, drive))
+            self._stamp_ns = sample.stamp_ns
+            self._health.latencies.append((clock.now().nanoseconds - sample.stamp_ns) * 1e-9)
+        self._heard = time.monotonic()
+
+    def _on_reference(self, message: JointState) -> None:
+        try:
+            self._session.follow(reference_from_message(message))
+        except MessageError as error:
+            self.get_logger().warning(f"not a reference: {error}", throttle_duration_sec=1.0)
+
+    def _apply(self, name: str, value: Any) -> None:
+        if name in SPECS:
+            self._session.set({name: check(name, value)})
+        else:
+            setattr(self._session, name, value)
+
+    def _load(self, gains: str) -> None:
+        """Take the gains of a file, once, where the start of the node did not say otherwise."""
+        if not gains or gains == self._loaded:
+            return
+        values = {k: v for k, v in gains_file.load(gains).items() if k not in self._parameter_overrides}
+        for result in self.set_parameters([Parameter(name, value=value) for name, value in values.items()]):
+            if not result.successful:
+                raise ValueError(result.reason)
+        self._loaded = gains
+
+    def _autostart(self) -> None:
+        self._starter.cancel()
+        if self.trigger_configure() == SUCCESS:
+            self.trigger_activate()
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; exit code 0, or 2 for a bad parameter."""
+    return serve(ControllerNode, "Position control of the actuator: NPID and its peers.", PARAMETERS, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

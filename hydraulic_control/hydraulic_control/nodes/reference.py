@@ -1,0 +1,170 @@
+"""Node `/actuator/reference`: plays a trajectory for the controller, one reference for every state of the plant.
+
+It leads from where the piston is smoothly to where the trajectory begins, plays it, and holds its end. `~/start` and
+`~/stop` are the switches; the response (time, reference, position, drive) can be kept in a file, which
+`evaluate --bench` reads.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.duration import Duration
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.reference_run import ReferenceRun
+from hydraulic_control.trajectories import KINDS, Limits
+from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE, absolute
+from hydraulic_interfaces.conversions import MessageError, ReferenceEncoder, sample_from_messages, to_time
+from hydraulic_interfaces.nodes.parameters import ParameterTable
+from hydraulic_interfaces.nodes.serving import ServedNode, serve
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_interfaces.qos import profile
+
+PARAMETERS = (
+    ParameterSpec("kind", "step", f"trajectory: {', '.join(KINDS)}", live=True),
+    ParameterSpec("offset", 0.0, "where it begins, or what it swings around", "m", -100.0, 100.0, live=True),
+    ParameterSpec("amplitude", 0.05, "step, way or amplitude", "m", -100.0, 100.0, live=True),
+    ParameterSpec("frequency", 0.5, "of sine, triangle and minimum_jerk", "Hz", 1e-3, 100.0, live=True),
+    ParameterSpec("cycles", 3, "of sine and triangle", "", 1, 10_000, live=True),
+    ParameterSpec("levels", 4, "of the staircase, up and down again", "", 1, 1000, live=True),
+    ParameterSpec("dwell", 2.0, "rest after a step, on a level, at the turn", "s", 0.0, 3600.0, live=True),
+    ParameterSpec("file", "", "of playback: CSV with the columns time_s and position_m", live=True),
+    ParameterSpec("travel_limit", 0.6, "largest position to either side", "m", 0.0, 100.0, live=True),
+    ParameterSpec("velocity_limit", 0.4, "largest velocity", "m/s", 1e-4, 100.0, live=True),
+    ParameterSpec("acceleration_limit", 10.0, "largest acceleration", "m/s^2", 1e-3, 1e4, live=True),
+    ParameterSpec("autostart", False, "start with the first state while a controller listens"),
+    ParameterSpec("exit_when_done", False, "leave after the run: exit code 0 played, 1 broken off", live=True),
+    ParameterSpec("output", "", "JSON file for the response; empty: none is kept", live=True),
+    ParameterSpec("state_timeout", 0.5, "silence of the state that breaks a run off", "s", 0.01, 10.0, live=True),
+)
+HEALTH_PERIOD_S = 0.5
+STATE_DEPTH = 10
+
+
+class ReferenceNode(ServedNode):
+    """Parameters, topics and services around a `ReferenceRun`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(REFERENCE_NODE, namespace=NAMESPACE, **options)
+        self._table = ParameterTable(self, PARAMETERS)
+        self._encode = ReferenceEncoder()
+        self._reference = self.create_publisher(JointState, "reference", profile("reference"))
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
+        self._armed: ReferenceRun | None = self._make() if self._table["autostart"] else None
+        self._run: ReferenceRun | None = None
+        self._held: float | None = None
+        self._end, self._failed = "idle", False
+        self._heard = self._reported = time.monotonic()
+        self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
+        self.create_service(Trigger, "~/start", self._on_start)
+        self.create_service(Trigger, "~/stop", self._on_stop)
+
+    def watch(self) -> None:
+        """What must happen without a message: notice silence, report health."""
+        now = time.monotonic()
+        if self._run is not None and now - self._heard > self._table["state_timeout"]:
+            self._finish(f"broken off: no state for {now - self._heard:.2f} s", failed=True)
+        if now - self._reported > HEALTH_PERIOD_S:
+            self._reported = now
+            self._publish_health()
+
+    def interrupt(self, name: str) -> None:
+        """SIGINT or SIGTERM: stand still where the reference is, and leave."""
+        if self._run is not None:
+            self._finish(f"broken off: {name}", failed=True)
+        self.over = True
+
+    def close(self) -> None:
+        """Let the last message arrive before the publisher goes."""
+        self._reference.wait_for_all_acked(Duration(seconds=1))
+
+    def _make(self) -> ReferenceRun:
+        v = self._table
+        limits = Limits(v["travel_limit"], v["velocity_limit"], v["acceleration_limit"])
+        return ReferenceRun(v["kind"], v.values(), limits)
+
+    def _on_state(self, message: JointState) -> None:
+        try:
+            sample = sample_from_messages(message)
+        except MessageError as error:
+            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+            return
+        self._heard = time.monotonic()
+        if self._armed is not None and self._reference.get_subscription_count():
+            self._run, self._armed, self._failed, self._end = self._armed, None, False, ""
+        try:
+            now = self._run.answer(sample) if self._run is not None else None
+        except HydraulicControlError as error:
+            self._finish(f"refused: {error}", failed=True)
+            return
+        if now is not None:
+            self._held = now.position
+            self._reference.publish(self._encode(now.stamp_ns, now.position, now.velocity))
+        elif self._held is not None:
+            self._reference.publish(self._encode(sample.stamp_ns, self._held, 0.0))
+        if self._run is not None and self._run.done:
+            self._finish("played", failed=False)
+
+    def _finish(self, end: str, failed: bool) -> None:
+        run, self._run = self._run, None
+        self._end, self._failed = f"{run.kind if run else 'reference'} {end}", failed
+        (self.get_logger().error if failed else self.get_logger().info)(self._end)
+        if run is not None and self._table["output"] and not failed:
+            try:
+                document = {"kind": run.kind, **run.response().as_document()}
+                Path(self._table["output"]).write_text(json.dumps(document) + "\n", encoding="utf-8")
+            except OSError as error:
+                self._failed = True
+                self.get_logger().error(f"{self._table['output']}: cannot be written: {error.strerror}")
+        self.exit_code = int(self._failed)
+        self.over = self.over or self._table["exit_when_done"]
+        self._publish_health()
+
+    def _publish_health(self) -> None:
+        state = f"plays {self._run.kind}" if self._run else "waits for states" if self._armed else self._end
+        row = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if self._failed else DiagnosticStatus.OK,
+            name=f"{absolute(REFERENCE_NODE)}: run",
+            message=state,
+            hardware_id="reference",
+            values=[KeyValue(key="last_run", value=self._end)],
+        )
+        array = DiagnosticArray(status=[row])
+        array.header.stamp = to_time(self.get_clock().now().nanoseconds)
+        self._diagnostics.publish(array)
+
+    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._run is not None or self._armed is not None:
+            response.message = "refused: a run is on, or waits to start"
+            return response
+        try:
+            self._armed = self._make()
+        except HydraulicControlError as error:
+            response.message = f"refused: {error}"
+            return response
+        response.success, response.message = True, f"starting {self._armed.kind}, {self._armed.duration:g} s"
+        return response
+
+    def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self._run is not None or self._armed is not None
+        self._armed = None
+        if self._run is not None:
+            self._finish("broken off: asked to stop", failed=True)
+        response.message = "stopped" if response.success else "nothing to stop"
+        return response
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the node; exit code 0, 1 when a run was broken off, 2 for a bad parameter or trajectory."""
+    return serve(ReferenceNode, "Play a reference trajectory for the controller.", PARAMETERS, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,47 @@
+"""Reference trajectories: each one a small class with `duration` [s] and `at(t)` → position [m] and velocity [m/s].
+
+A new kind is one more file and one more row in `KINDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from hydraulic_control.errors import HydraulicControlError
+
+from ._base import Limits, Trajectory, check
+from .minimum_jerk import MinimumJerk
+from .playback import Playback
+from .sequence import Rest, Sequence, approach
+from .sine import Sine
+from .staircase import Staircase
+from .step import Step
+from .trapezoid import Trapezoid
+from .triangle import Triangle
+
+KINDS: dict[str, Callable[[Mapping[str, Any], Limits], Trajectory]] = {
+    "step": Step.from_settings,
+    "staircase": Staircase.from_settings,
+    "sine": Sine.from_settings,
+    "triangle": Triangle.from_settings,
+    "trapezoid": Trapezoid.from_settings,
+    "minimum_jerk": MinimumJerk.from_settings,
+    "playback": Playback.from_settings,
+}
+
+
+def make(kind: str, settings: Mapping[str, Any], limits: Limits) -> Trajectory:
+    """The trajectory of that kind, within the limits.
+
+    ``settings``: offset [m], amplitude [m], frequency [Hz], cycles, levels, dwell [s], file. Raises
+    `HydraulicControlError` for an unknown kind, or where it would leave the limits.
+    """
+    if kind not in KINDS:
+        raise HydraulicControlError(f"reference kind is {kind!r}; allowed are {', '.join(KINDS)}")
+    trajectory = KINDS[kind](settings, limits)
+    check(kind, trajectory, limits)
+    return trajectory
+
+
+__all__ = ["KINDS", "Limits", "Rest", "Sequence", "Trajectory", "approach", "check", "make"]

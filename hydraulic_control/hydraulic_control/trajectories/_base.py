@@ -1,0 +1,58 @@
+"""What every trajectory has in common, and the check that it stays within the limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from hydraulic_control.errors import HydraulicControlError
+
+_GRID_S = 1e-3
+_LONGEST_GRID = 2_000_000
+_TOLERANCE = 1.001
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Largest position to either side of mid-stroke [m], velocity [m/s] and acceleration [m/s²] of a reference."""
+
+    travel: float = 0.6
+    velocity: float = 0.4
+    acceleration: float = 10.0
+
+
+class Trajectory(Protocol):
+    """A reference over time; before 0 and after its duration it rests."""
+
+    @property
+    def duration(self) -> float:
+        """Seconds until it rests for good."""
+
+    @property
+    def jumps(self) -> bool:
+        """Whether its position jumps, which no limit of velocity can hold for."""
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Position [m] and velocity [m/s] at ``t`` [s]."""
+
+
+def check(name: str, trajectory: Trajectory, limits: Limits) -> None:
+    """Raise `HydraulicControlError` where the trajectory leaves the limits: what, how far, what is allowed.
+
+    A step and a staircase jump: of them only the travel is checked, the actuator goes as fast as it can.
+    """
+    count = min(int(trajectory.duration / _GRID_S) + 2, _LONGEST_GRID)
+    time = np.linspace(-_GRID_S, trajectory.duration + _GRID_S, count + 2)
+    rows = np.array([trajectory.at(t) for t in time.tolist()])
+    found = {"position": (np.max(np.abs(rows[:, 0])), limits.travel, "m")}
+    if not trajectory.jumps:
+        acceleration = np.diff(rows[:, 1]) / (time[1] - time[0])
+        found["velocity"] = (np.max(np.abs(rows[:, 1])), limits.velocity, "m/s")
+        found["acceleration"] = (np.max(np.abs(acceleration)), limits.acceleration, "m/s²")
+    for what, (value, allowed, unit) in found.items():
+        if not value <= allowed * _TOLERANCE:
+            raise HydraulicControlError(
+                f"{name}: the reference's {what} reaches {value:.4g} {unit}; allowed are {allowed:.4g} {unit}"
+            )

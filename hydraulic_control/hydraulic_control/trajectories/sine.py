@@ -1,0 +1,45 @@
+"""A sine that swells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ._base import Limits
+from .minimum_jerk import blend
+
+
+@dataclass(frozen=True)
+class Sine:
+    """``amplitude`` [m] around ``offset`` [m] at ``frequency`` [Hz] for ``cycles``; it swells and fades over one more
+    cycle each, so that it begins and ends at rest."""
+
+    offset: float
+    amplitude: float
+    frequency: float
+    cycles: int
+    jumps: ClassVar[bool] = False
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Sine:
+        """See `make`."""
+        return cls(settings["offset"], settings["amplitude"], settings["frequency"], settings["cycles"])
+
+    @property
+    def duration(self) -> float:
+        """Seconds until it rests for good."""
+        return (self.cycles + 2) / self.frequency
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Position [m] and velocity [m/s]."""
+        t = min(max(t, 0.0), self.duration)
+        rising, slope = blend(t * self.frequency)
+        if t * self.frequency > self.cycles + 1:
+            rising, slope = blend((self.duration - t) * self.frequency)
+            slope = -slope
+        omega = 2.0 * math.pi * self.frequency
+        wave, turn = math.sin(omega * t), math.cos(omega * t)
+        velocity = self.amplitude * (rising * omega * turn + slope * self.frequency * wave)
+        return self.offset + self.amplitude * rising * wave, velocity

@@ -1,0 +1,58 @@
+"""There and back with a trapezoidal profile of the velocity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ._base import Limits
+
+
+@dataclass(frozen=True)
+class Trapezoid:
+    """From ``offset`` [m] by ``amplitude`` [m] at the limits of ``velocity`` [m/s] and ``acceleration`` [m/s²],
+    ``dwell`` [s] of rest, and back. A way too short for full speed has a triangular profile."""
+
+    offset: float
+    amplitude: float
+    velocity: float
+    acceleration: float
+    dwell: float
+    jumps: ClassVar[bool] = False
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Trapezoid:
+        """See `make`."""
+        return cls(
+            settings["offset"], settings["amplitude"], limits.velocity, limits.acceleration, settings["dwell"]
+        )
+
+    @property
+    def _way(self) -> tuple[float, float]:
+        """Time of acceleration and of the whole way [s]."""
+        distance = abs(self.amplitude)
+        ramp = min(self.velocity / self.acceleration, math.sqrt(distance / self.acceleration))
+        speed = self.acceleration * ramp
+        return ramp, (distance / speed + ramp) if speed > 0.0 else 0.0
+
+    @property
+    def duration(self) -> float:
+        """Seconds until it rests for good."""
+        return 2.0 * self._way[1] + self.dwell
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Position [m] and velocity [m/s]."""
+        ramp, total = self._way
+        turned = t > total + 0.5 * self.dwell
+        now = min(max(self.duration - t if turned else t, 0.0), total)
+        left = total - now
+        if now < ramp:
+            way, speed = 0.5 * self.acceleration * now**2, self.acceleration * now
+        elif left < ramp:
+            way, speed = abs(self.amplitude) - 0.5 * self.acceleration * left**2, self.acceleration * left
+        else:
+            way, speed = self.acceleration * ramp * (now - 0.5 * ramp), self.acceleration * ramp
+        sign = math.copysign(1.0, self.amplitude)
+        return self.offset + sign * way, sign * (-speed if turned else speed)

@@ -1,0 +1,122 @@
+"""The steps of tuning: critical points, gains by rule, optimisation; what `tune` prints and writes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hydraulic_control import rules
+from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.identified import IdentifiedModel
+from hydraulic_control.margins import critical_of_identified, critical_of_model
+from hydraulic_control.relay import CriticalPoint, RelaySettings, measure
+from hydraulic_control.scenario import Case, identified, nominal, scattered
+from hydraulic_control.simulation import SensorNoise, SimulatedPlant
+from hydraulic_control.tuning import FREE, Criteria, Tuned, best_start, optimise
+from hydraulic_sim.linear import closed_form
+from hydraulic_sim.model import Model
+
+FREQUENCIES = (5.0, 10.0, 20.0, 40.0)  # rad/s, of the poles that rules place
+SEED = 1  # of the plants that gains are tuned on: not those that `evaluate` judges them on
+_FORCE_START = 1e-5  # V/N
+
+
+@dataclass(frozen=True)
+class Found:
+    """A critical point and where it is from; None where the model has none."""
+
+    source: str
+    point: CriticalPoint | None
+    remark: str = ""
+
+
+def critical_points(
+    model: Model,
+    models: Sequence[IdentifiedModel],
+    noise: SensorNoise,
+    relay: RelaySettings | None,
+    measured: CriticalPoint | None,
+) -> list[Found]:
+    """Critical points of the linearised plant, the identified models, and a relay experiment (``measured`` on a bench,
+    or run here on the plant where ``relay`` is given)."""
+    found = [Found("linearised at rest", critical_of_model(model), "dry friction left out")]
+    for one in models:
+        point = critical_of_identified(one)
+        remark = "" if point else f"no crossing below its Nyquist frequency, {one.highest:.0f} rad/s"
+        found.append(Found(f"identified {one.name}", point, remark))
+    if measured is not None:
+        found.append(Found("relay on the bench", measured))
+    elif relay is not None:
+        point, remark = None, f"±{relay.amplitude:g} V"
+        try:
+            point = measure(SimulatedPlant(model, noise), relay)
+        except HydraulicControlError as error:
+            remark = str(error)
+        found.append(Found("relay on the plant", point, remark))
+    return found
+
+
+def by_rule(found: Sequence[Found], velocity_gain: float, lag: float) -> dict[str, rules.Gains]:
+    """Gains by every rule from every critical point, and by pole placement, named for the tables."""
+    made = {
+        f"{rule} · {one.source}": function(one.point)
+        for one in found
+        if one.point is not None
+        for rule, function in rules.RULES.items()
+    }
+    for frequency in FREQUENCIES:
+        made[f"pole_placement · {frequency:g} rad/s"] = rules.pole_placement(velocity_gain, lag, frequency)
+    return made
+
+
+def simple_model(model: Model, models: Sequence[IdentifiedModel]) -> tuple[float, float]:
+    """Velocity gain [m/(s·V)] and lag [s] of the model K/(s(Ts + 1)): from the first identified model, else from the
+    physics; the lag is that of spool and loop."""
+    gain = models[0].velocity_gain if models else closed_form(model).velocity_gain
+    spool = 0.0
+    if "spool_dynamics" in model.effects:
+        spool = 2.0 * model.value("spool_dynamics.damping") / (6.283185 * model.value("spool_dynamics.frequency"))
+    return gain, max(spool + 1.5e-3, 1e-3)
+
+
+def tune(
+    law: str,
+    model: Model,
+    models: Sequence[IdentifiedModel],
+    gains: Mapping[str, rules.Gains],
+    simple: tuple[float, float],
+    steps: Sequence[float],
+    criteria: Criteria,
+    plants: int,
+    trials: int,
+    noise: SensorNoise,
+    force: bool = True,
+) -> Tuned:
+    """The law's values, optimised from the best start that the rules give."""
+    cases: list[Case] = [nominal(model, noise), *scattered(model, plants, SEED, noise), *identified(models)]
+    duration = 2.5 * max(criteria.settling, criteria.rise) + 0.3
+    candidates = starts(law, gains, simple, force and model.kind == "hydraulic")
+    begin = best_start(candidates, cases, steps, criteria, duration)
+    free = [name for name in FREE[law] if force or name != "force_feedback"]
+    return optimise(begin, cases, steps, criteria, free, duration, trials)
+
+
+def starts(
+    law: str, gains: Mapping[str, rules.Gains], simple: tuple[float, float], force: bool
+) -> list[dict[str, Any]]:
+    """Where the search may begin: the rules' gains for PID, softened at small errors for NPID, poles for placement."""
+    common: dict[str, Any] = {"controller": law, "force_feedback": _FORCE_START if force else 0.0}
+    if law == "pole_placement":
+        model = {"pole_placement.velocity_gain": simple[0], "pole_placement.lag": simple[1]}
+        return [
+            common | model | {"pole_placement.frequency": f, "pole_placement.observer": 3.0 * f} for f in FREQUENCIES
+        ]
+    if law == "pid":
+        return [common | g.as_values() for g in gains.values()]
+    shapes = [{"k1": 3.0, "k2": 50.0}, {"k1": 0.5, "k2": 50.0}]
+    return [
+        common | shape | {n: v / (1.0 + 0.5 * shape["k1"]) for n, v in g.as_values().items()}
+        for g in gains.values()
+        for shape in shapes
+    ]

@@ -1,0 +1,168 @@
+"""Optimisation of the gains on the nonlinear plant, its scattered copies and the identified models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from hydraulic_control.controller import Controller
+from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.parameters import SPECS
+from hydraulic_control.response import Response, StepFigures, step_figures
+from hydraulic_control.scenario import Case
+from hydraulic_control.simulation import run, step_reference
+
+FREE: dict[str, tuple[str, ...]] = {
+    "npid": ("kp", "ki", "kd", "k1", "k2", "force_feedback"),
+    "pid": ("kp", "ki", "kd", "force_feedback"),
+    "pole_placement": ("pole_placement.frequency", "pole_placement.observer", "force_feedback"),
+}
+"""What is optimised of each law; everything else stays as it starts."""
+
+FLOOR = {"ki": 1.0, "kd": 1e-3, "force_feedback": 1e-8, "k1": 0.05, "k2": 1.0}
+"""Where the search begins for a gain that starts at 0: it moves on a logarithmic scale."""
+
+_BEGIN_S = 0.05
+_HOPELESS = 10.0
+_WITHIN = 0.1
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """Goals of a step: rise and settling time [s], overshoot [%], steady-state error [m], speed of the drive [V/s].
+
+    The cost of a step is the mean of its figures over their goals, a tenth of what lies within the goal and all beyond
+    it: first all goals are met, then each is bettered. ``ise`` is the goal of the integral of the squared error, over
+    the square of the step [s]. The cost of gains is half the mean and half the worst over the plants, so that no plant
+    is given up.
+    """
+
+    rise: float = 0.2
+    settling: float = 0.5
+    overshoot: float = 1.0
+    steady_state: float = 5e-5
+    activity: float = 200.0
+    ise: float = 0.15
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise HydraulicControlError(f"criterion {name} is {value:g}; it must be positive and finite")
+
+    def cost(self, figures: StepFigures, step: float) -> float:
+        """Of one step of ``step`` [m]; a tenth where the goals are just met, never more than `_HOPELESS` a figure."""
+        ratios = [
+            figures.rise_time / self.rise,
+            figures.settling_time / self.settling,
+            figures.overshoot / self.overshoot,
+            figures.steady_state_error / self.steady_state,
+            figures.activity / self.activity,
+            figures.ise / (step**2 * self.ise),
+        ]
+        parts = [_WITHIN * x + (1.0 - _WITHIN) * max(x - 1.0, 0.0) if math.isfinite(x) else _HOPELESS for x in ratios]
+        return float(np.mean(np.minimum(parts, _HOPELESS)))
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """The values found, their cost, that of the start, and how many times they were tried."""
+
+    values: dict[str, Any]
+    cost: float
+    start_cost: float
+    trials: int
+
+
+def try_step(values: Mapping[str, Any], case: Case, step: float, duration: float) -> Response:
+    """The response to a step of ``step`` [m], which comes after a moment of rest."""
+    controller = Controller(values)
+    return run(case.make(), controller, step_reference(step, at=_BEGIN_S), duration + _BEGIN_S)
+
+
+def figures_of(response: Response) -> StepFigures | None:
+    """Figures of a step; None where the plant ran away."""
+    return step_figures(response) if np.isfinite(response.position).all() else None
+
+
+def cost_of(
+    values: Mapping[str, Any], cases: Sequence[Case], steps: Sequence[float], criteria: Criteria, duration: float
+) -> float:
+    """Cost of these values over all plants and steps [m]."""
+    costs = []
+    for case in cases:
+        for step in steps:
+            figures = figures_of(try_step(values, case, step, duration))
+            costs.append(_HOPELESS if figures is None else criteria.cost(figures, step))
+    return 0.5 * float(np.mean(costs)) + 0.5 * max(costs)
+
+
+def optimise(
+    start: Mapping[str, Any],
+    cases: Sequence[Case],
+    steps: Sequence[float],
+    criteria: Criteria,
+    free: Sequence[str] | None = None,
+    duration: float = 1.5,
+    trials: int = 300,
+) -> Tuned:
+    """Better values than ``start`` for those that are free (by default what `FREE` says of its law).
+
+    Nelder–Mead on the logarithms, begun twice: the second time from where the first one stopped, which frees a simplex
+    that has shrunk too early. Raises `HydraulicControlError` for a start or free names that are not allowed.
+    """
+    law = Controller(start).values["controller"]
+    names = tuple(FREE[law] if free is None else free)
+    for name in names:
+        if name not in SPECS or not isinstance(SPECS[name].default, float):
+            raise HydraulicControlError(f"{name!r} cannot be optimised; numbers are {', '.join(FREE[law])} …")
+    first = {name: max(float(start.get(name, SPECS[name].default)), FLOOR.get(name, 1e-9)) for name in names}
+    best: dict[str, Any] = dict(start)
+    lowest = before = cost_of(start, cases, steps, criteria, duration)
+    count = 1
+
+    def cost(x: np.ndarray) -> float:
+        nonlocal best, lowest, count
+        count += 1
+        values = dict(start) | {n: _inside(n, first[n] * math.exp(v)) for n, v in zip(names, x.tolist(), strict=True)}
+        try:
+            now = cost_of(values, cases, steps, criteria, duration)
+        except HydraulicControlError:  # poles that its period cannot have
+            return 2.0 * _HOPELESS
+        if now < lowest:
+            best, lowest = values, now
+        return now
+
+    origin: np.ndarray = np.zeros(len(names))
+    for share in (0.6, 0.4):
+        simplex = np.vstack([origin, origin + np.diag(np.where(np.arange(len(names)) % 2, 0.7, 0.5))])
+        minimize(
+            cost,
+            origin,
+            method="Nelder-Mead",
+            options={"initial_simplex": simplex, "maxfev": round(share * trials), "adaptive": True, "fatol": 1e-4},
+        )
+        origin = np.array([math.log(max(float(best.get(n, first[n])), 1e-12) / first[n]) for n in names])
+    return Tuned(best, lowest, before, count)
+
+
+def best_start(
+    candidates: Sequence[Mapping[str, Any]],
+    cases: Sequence[Case],
+    steps: Sequence[float],
+    criteria: Criteria,
+    duration: float = 1.5,
+) -> Mapping[str, Any]:
+    """The candidate of least cost."""
+    return min(candidates, key=lambda values: cost_of(values, cases, steps, criteria, duration))
+
+
+def _inside(name: str, value: float) -> float:
+    spec = SPECS[name]
+    low = 0.0 if spec.minimum is None else spec.minimum
+    high = math.inf if spec.maximum is None else spec.maximum
+    return min(max(value, low), high)

@@ -1,0 +1,172 @@
+"""Judge gains as the paper does: step, staircase and sine on identified models, nonlinear plant and bench.
+
+The figures stand beside the paper's. With --scatter the same step is tried on scattered copies of the plant, so that
+controllers can be compared by their median and their worst case.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from hydraulic_control import cli, evaluation, gains_file, paper
+from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.identified import load_identified
+from hydraulic_control.response import Response
+from hydraulic_control.simulation import QUIET, SensorNoise
+from hydraulic_control.trajectories import KINDS
+from hydraulic_control.tuning import Criteria
+from hydraulic_sim.model_file import load_model
+
+EPILOG = """\
+examples:
+  python -m hydraulic_control evaluate --gains npid pid --scatter 24
+  python -m hydraulic_control evaluate --gains npid --identified runs/chirp/identify.json runs/multisine/identify.json
+"""
+SEED = 2026  # of the plants that gains are judged on: not those of tuning
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry of the verb; its exit code."""
+    parser = cli.parser("evaluate", __doc__.partition("\n")[0], EPILOG)
+    parser.add_argument(
+        "--gains",
+        metavar="FILE",
+        nargs="+",
+        default=["npid"],
+        help=f"parameter files, or shipped ones: {', '.join(gains_file.shipped())} (default npid)",
+    )
+    parser.add_argument("--model", metavar="FILE", default="moog_mcr_m_1002_bench", help="model file or preset")
+    parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="results of identify")
+    parser.add_argument("--bench", metavar="JSON", nargs="+", default=[], help="responses that the node reference kept")
+    parser.add_argument("--step", metavar="METRES", type=cli.positive, default=0.05, help="step (default 0.05)")
+    parser.add_argument("--scatter", metavar="N", type=cli.count, default=0, help="scattered plants (default 0)")
+    parser.add_argument("--no-noise", action="store_true", help="sensors without noise")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of tables")
+    return cli.run(parser, _evaluate, argv)
+
+
+def _evaluate(options: argparse.Namespace) -> None:
+    model = load_model(options.model)
+    models = [load_identified(path).named(_label(path)) for path in options.identified]
+    bench = [_bench(Path(path)) for path in options.bench]
+    noise = QUIET if options.no_noise else SensorNoise()
+    results = {}
+    for name in options.gains:
+        values = gains_file.load(name)
+        result = evaluation.evaluate(values, model, models, bench, options.step, noise)
+        if options.scatter:
+            result["scatter"] = evaluation.over_scatter(
+                values, model, options.scatter, SEED, options.step, noise, Criteria()
+            )
+        results[name] = result
+    if options.json:
+        print(json.dumps(_finite(results), ensure_ascii=False))
+        return
+    console = Console(file=sys.stdout, highlight=False, markup=False)
+    for name, result in results.items():
+        _print_steps(console, name, result, options.step)
+        _print_tracking(console, name, result)
+    if options.scatter:
+        _print_scatter(console, results, options.scatter)
+
+
+def _label(path: str) -> str:
+    """What tells identified models apart: the file's name, or its folder's where all files are called identify."""
+    file = Path(path)
+    return file.absolute().parent.name if file.stem == "identify" else file.stem
+
+
+def _bench(path: Path) -> tuple[str, Response]:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise HydraulicControlError(f"{path}: not a JSON document ({error})") from None
+    kind = document.get("kind") if isinstance(document, dict) else None
+    if kind not in KINDS:
+        raise HydraulicControlError(f"{path}: kind is {kind!r}; allowed are {', '.join(KINDS)}")
+    return kind, Response.from_document(document)
+
+
+def _print_steps(console: Console, name: str, result: dict[str, Any], step: float) -> None:
+    table = Table(title=f"{name}: step of {1e3 * step:g} mm", title_justify="left")
+    for title in ("plant", "Tr s", "Ts s", "OS %", "error µm", "effort V", "paper Tr", "paper Ts", "paper OS"):
+        table.add_column(title, justify="left" if title == "plant" else "right", no_wrap=True)
+    for row in result["rows"]:
+        if row["reference"] != "step":
+            continue
+        printed = paper.beside(row["where"])
+        beside = [f"{v:g}" for v in printed[0]] if printed else ["–"] * 3
+        table.add_row(row["where"], *_step_cells(row), *beside)
+    console.print(table)
+    for agreement in result["agreement"]:
+        printed = paper.beside(agreement["identified"])
+        word = "within" if agreement["alike"] else "not within"
+        text = f"identified {agreement['identified']} and nonlinear plant agree {word} 15 % on each figure"
+        if printed:
+            better = evaluation.better_than_paper(result, agreement["identified"])
+            limits = " / ".join(f"{v:g}" for v in printed[1])
+            word = "better than" if better else "not better than"
+            text += f"; nonlinear plant {word} the paper's {limits} (Tr / Ts / OS)"
+        console.print(text)
+
+
+def _step_cells(row: dict[str, Any]) -> list[str]:
+    if row["runs_away"]:
+        return ["runs away", *[""] * 4]
+    return [
+        f"{row['rise_time']:.3f}",
+        f"{row['settling_time']:.3f}",
+        f"{row['overshoot']:.2f}",
+        f"{1e6 * row['steady_state_error']:.1f}",
+        f"{row['effort']:.2f}",
+    ]
+
+
+def _print_tracking(console: Console, name: str, result: dict[str, Any]) -> None:
+    table = Table(title=f"{name}: tracking", title_justify="left")
+    for title in ("plant", "reference", "RMS error mm", "largest error mm", "effort V", "drive's speed V/s"):
+        table.add_column(title, justify="left" if title in ("plant", "reference") else "right", no_wrap=True)
+    for row in result["rows"]:
+        cells = ["runs away", "", "", ""]
+        if not row["runs_away"]:
+            cells = [f"{1e3 * row['rms_error']:.3f}", f"{1e3 * row['largest_error']:.3f}"]
+            cells += [f"{row['effort']:.3f}", f"{row['activity']:.1f}"]
+        table.add_row(row["where"], row["reference"], *cells)
+    console.print(table)
+
+
+def _print_scatter(console: Console, results: dict[str, Any], count: int) -> None:
+    table = Table(title=f"the same step on {count} scattered plants", title_justify="left")
+    for title in ("gains", "", "Tr s", "Ts s", "OS %", "error µm", "drive's speed V/s", "cost", "unsettled"):
+        table.add_column(title, justify="left" if title in ("gains", "") else "right", no_wrap=True)
+    for name, result in results.items():
+        found = result["scatter"]
+        for which in ("median", "worst"):
+            f = found[which]
+            lost = f"{found['unsettled'] + found['ran_away']}" if which == "worst" else ""
+            if f:
+                cells = [f"{f['rise_time']:.3f}", f"{f['settling_time']:.3f}", f"{f['overshoot']:.2f}"]
+                cells += [f"{1e6 * f['steady_state_error']:.1f}", f"{f['activity']:.1f}", f"{f['cost']:.3f}"]
+                table.add_row(name, which, *cells, lost)
+    console.print(table)
+
+
+def _finite(value: Any) -> Any:
+    """The same in JSON's own types: what is not finite becomes null."""
+    if isinstance(value, dict):
+        return {key: _finite(v) for key, v in value.items()}
+    if isinstance(value, list):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,157 @@
+"""Tune the controller: critical point, gains by rule, and gains optimised on the nonlinear plant.
+
+The critical gain and period come from the linearised model, from identified models, and from a relay experiment on the
+plant (or one that the node relay has made on a bench). Ziegler–Nichols, Tyreus–Luyben and pole placement turn them into
+starts, from which the gains are optimised over the plant, scattered copies of it and the identified models. Writes a
+parameter file for the node.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from hydraulic_control import cli, gains_file, tune_run
+from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.identified import load_identified
+from hydraulic_control.parameters import CONTROLLERS
+from hydraulic_control.relay import CriticalPoint, RelaySettings
+from hydraulic_control.scenario import nominal, scattered
+from hydraulic_control.simulation import SensorNoise
+from hydraulic_control.tuning import Criteria, Tuned, figures_of, try_step
+from hydraulic_sim.model_file import load_model
+
+EPILOG = """\
+examples:
+  python -m hydraulic_control tune --out runs/npid.yaml
+  python -m hydraulic_control tune --identified runs/chirp/identify.json --rise 0.2 --settling 0.45 --out runs/npid.yaml
+  python -m hydraulic_control tune --controller pid --trials 0 --relay runs/relay.json --out runs/pid.yaml
+"""
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry of the verb; its exit code."""
+    parser = cli.parser("tune", __doc__.partition("\n")[0], EPILOG)
+    parser.add_argument("--controller", choices=CONTROLLERS, default="npid", help="law to tune (default npid)")
+    parser.add_argument("--model", metavar="FILE", default="moog_mcr_m_1002_bench", help="model file or preset")
+    parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="results of identify")
+    parser.add_argument("--relay", metavar="JSON", help="result of the node relay, instead of one on the plant here")
+    parser.add_argument("--relay-amplitude", metavar="V", type=cli.positive, default=0.5, help="default 0.5")
+    parser.add_argument("--steps", metavar="METRES", type=cli.positive, nargs="+", default=[0.05, 0.01])
+    for name, default in vars(Criteria()).items():
+        option = f"--{name.replace('_', '-')}"
+        parser.add_argument(option, type=cli.positive, default=default, help=f"goal (default {default:g})")
+    parser.add_argument("--plants", metavar="N", type=cli.count, default=5, help="scattered plants (default 5)")
+    parser.add_argument("--trials", metavar="N", type=cli.count, default=300, help="0: best rule only (default 300)")
+    parser.add_argument("--no-force-feedback", action="store_true", help="without dynamic pressure feedback")
+    parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="parameter file to write")
+    parser.add_argument("--overwrite", action="store_true", help="replace what is at --out")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of tables")
+    return cli.run(parser, _tune, argv)
+
+
+def _tune(options: argparse.Namespace) -> None:
+    path = cli.new_file(options.out, options.overwrite)
+    model = load_model(options.model)
+    models = [load_identified(p) for p in options.identified]
+    criteria = Criteria(**{name: getattr(options, name) for name in vars(Criteria())})
+    relay = RelaySettings(amplitude=options.relay_amplitude)
+    measured = _measured(Path(options.relay)) if options.relay else None
+    noise = SensorNoise()
+    console = Console(stderr=True)
+    with console.status("critical points …"):
+        found = tune_run.critical_points(model, models, noise, relay, measured)
+        simple = tune_run.simple_model(model, models)
+        gains = tune_run.by_rule(found, *simple)
+    with console.status(f"optimising {options.controller} …"):
+        tuned = tune_run.tune(
+            options.controller, model, models, gains, simple, options.steps, criteria, options.plants, options.trials,
+            noise, not options.no_force_feedback,
+        )  # fmt: skip
+    path.write_text(gains_file.text(tuned.values, _remarks(options, tuned)), encoding="utf-8")
+    if options.json:
+        print(json.dumps(_document(found, gains, tuned), ensure_ascii=False))
+        return
+    out = Console(file=sys.stdout, highlight=False, markup=False)
+    _print_points(out, found)
+    _print_rules(out, gains)
+    _print_tuned(out, options, model, tuned, noise)
+    out.print(f"\n{path}")
+
+
+def _measured(path: Path) -> CriticalPoint:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        return CriticalPoint(float(document["critical_gain"]), float(document["critical_period"]))
+    except (ValueError, KeyError, TypeError):
+        raise HydraulicControlError(f"{path}: needs numbers for critical_gain and critical_period") from None
+
+
+def _remarks(options: argparse.Namespace, tuned: Tuned) -> str:
+    goals = ", ".join(f"{name} {getattr(options, name):g}" for name in vars(Criteria()))
+    where = f"{options.model}, {options.plants} scattered copies"
+    where += f", {len(options.identified)} identified models" if options.identified else ""
+    steps = ", ".join(f"{1e3 * s:g}" for s in options.steps)
+    return (
+        f"Gains of {options.controller}, found by tune on {where};\nsteps of {steps} mm; goals: {goals} (SI, overshoot "
+        f"in %).\nCost {tuned.cost:.4g}, from {tuned.start_cost:.4g} by rule, after {tuned.trials} trials."
+    )
+
+
+def _print_points(out: Console, found: list[tune_run.Found]) -> None:
+    table = Table(title="critical point of a proportional loop", title_justify="left")
+    for title in ("from", "gain V/m", "period ms", ""):
+        table.add_column(title, justify="left" if title in ("from", "") else "right")
+    for one in found:
+        cells = ["–", "–"] if one.point is None else [f"{one.point.gain:.4g}", f"{1e3 * one.point.period:.4g}"]
+        table.add_row(one.source, *cells, one.remark)
+    out.print(table)
+
+
+def _print_rules(out: Console, gains: dict[str, Any]) -> None:
+    table = Table(title="gains by rule", title_justify="left")
+    for title in ("rule", "Kp V/m", "Ki V/(m·s)", "Kd V·s/m"):
+        table.add_column(title, justify="left" if title == "rule" else "right")
+    for name, g in gains.items():
+        table.add_row(name, f"{g.kp:.4g}", f"{g.ki:.4g}", f"{g.kd:.4g}")
+    out.print(table)
+
+
+def _print_tuned(out: Console, options: argparse.Namespace, model: Any, tuned: Tuned, noise: SensorNoise) -> None:
+    values = ", ".join(f"{n} {v:.4g}" for n, v in tuned.values.items() if isinstance(v, float))
+    out.print(f"{options.controller}: {values}")
+    out.print(f"cost {tuned.cost:.4g} (best rule {tuned.start_cost:.4g}) after {tuned.trials} trials")
+    table = Table(title="steps with these values", title_justify="left")
+    for title in ("plant", "step mm", "Tr s", "Ts s", "OS %", "error µm"):
+        table.add_column(title, justify="left" if title == "plant" else "right")
+    for case in [nominal(model, noise), *scattered(model, options.plants, tune_run.SEED, noise)]:
+        for step in options.steps:
+            f = figures_of(try_step(tuned.values, case, step, 2.0))
+            cells = ["runs away", "", "", ""] if f is None else [f"{f.rise_time:.3f}", f"{f.settling_time:.3f}"]
+            cells += [] if f is None else [f"{f.overshoot:.2f}", f"{1e6 * f.steady_state_error:.1f}"]
+            table.add_row(case.name, f"{1e3 * step:g}", *cells)
+    out.print(table)
+
+
+def _document(found: list[tune_run.Found], gains: dict[str, Any], tuned: Tuned) -> dict[str, Any]:
+    return {
+        "critical_points": [
+            {"source": one.source, "remark": one.remark, **(one.point.as_document() if one.point else {})}
+            for one in found
+        ],
+        "rules": {name: g.as_values() for name, g in gains.items()},
+        "values": tuned.values,
+        "cost": tuned.cost,
+        "start_cost": tuned.start_cost,
+        "trials": tuned.trials,
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())
