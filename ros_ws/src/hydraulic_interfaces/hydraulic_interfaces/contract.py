@@ -14,6 +14,7 @@ EXCITATION_NODE = "excitation"
 RECORDER_NODE = "recorder"
 CONTROLLER_NODE = "controller"
 REFERENCE_NODE = "reference"
+RELAY_NODE = "relay"
 ESTIMATOR_NODE = "estimator"
 
 PISTON = "piston"
