@@ -5,7 +5,9 @@ Every object that is written is read back. A device is never reset: some valves 
 
 from __future__ import annotations
 
+import contextlib
 import logging
+from collections.abc import Iterator
 
 import can
 import canopen
@@ -28,7 +30,7 @@ RECEIVE, TRANSMIT = (0x1400, 0x1600), (0x1800, 0x1A00)
 START, STOP, PRE_OPERATIONAL = 1, 2, 128
 
 _NOT_VALID, _NO_REMOTE = 1 << 31, 1 << 30
-_ANSWER_S = 1.0
+_ANSWER_S, _BRIEFLY_S = 1.0, 0.25
 
 # What the library logs, the errors raised here say too, with the device and the object.
 logging.getLogger("canopen").addHandler(logging.NullHandler())
@@ -57,8 +59,15 @@ class Master:
         self._network.listeners.insert(0, receiver)  # type: ignore[arg-type]
         self._network.connect()
         for node in bus.nodes.values():
-            remote = self._network.add_node(node.id, canopen.ObjectDictionary())
-            remote.sdo.RESPONSE_TIMEOUT, remote.sdo.MAX_RETRIES = _ANSWER_S, 2
+            self._network.add_node(node.id, canopen.ObjectDictionary())
+        self._patience(_ANSWER_S, 2)
+
+    @contextlib.contextmanager
+    def impatient(self) -> Iterator[None]:
+        """Ask once and briefly, for what is done while leaving."""
+        self._patience(_BRIEFLY_S, 1)
+        yield
+        self._patience(_ANSWER_S, 2)
 
     def close(self) -> None:
         """Give the interface back; may be called again."""
@@ -142,6 +151,10 @@ class Master:
         """Let the device watch the heartbeat of the driver, or no longer; it goes to 0 V when that fails."""
         master = self._bus.master
         self.write(node, CONSUMER_HEARTBEAT, master.id << 16 | round(master.lost_after * 1e3) if on else 0)
+
+    def _patience(self, seconds: float, tries: int) -> None:
+        for remote in self._network.values():
+            remote.sdo.RESPONSE_TIMEOUT, remote.sdo.MAX_RETRIES = seconds, tries
 
     def _put(self, node: Node, address: Address, value: float) -> None:
         try:

@@ -17,7 +17,7 @@ from hydraulic_can_driver.can_bus import hears_itself
 from hydraulic_can_driver.faults import Fault, FaultLatch
 from hydraulic_can_driver.frames import Frames
 
-SYNC, NMT, EMERGENCY, SDO_ANSWER, HEARTBEAT = 0x080, 0x000, 0x080, 0x580, 0x700
+SYNC, NMT, EMERGENCY, SDO_ANSWER, SDO_QUESTION, HEARTBEAT = 0x080, 0x000, 0x080, 0x580, 0x600, 0x700
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0, 4, 5, 127
 STATES = {BOOT_UP: "boot-up", STOPPED: "STOPPED", OPERATIONAL: "OPERATIONAL", PRE_OPERATIONAL: "PRE-OPERATIONAL"}
 _EMERGENCY = struct.Struct("<HB5s")
@@ -50,6 +50,8 @@ class Receiver(can.Listener):
             self._handlers[HEARTBEAT + node.id] = lambda data, node=node: self._heartbeat(node, data)  # type: ignore[misc]
             self._handlers[EMERGENCY + node.id] = lambda data, node=node: self._emergency(node, data)  # type: ignore[misc]
             self._known.add(SDO_ANSWER + node.id)
+            if hears_itself(interface):
+                self._known.add(SDO_QUESTION + node.id)
         for own in (SYNC, NMT, bus.drive_pdo.cob_id, HEARTBEAT + bus.master.id):
             self._handlers[own] = lambda data, own=own: self._own(own)  # type: ignore[misc]
         self._kernel_sync = kernel_sync

@@ -16,6 +16,7 @@ from hydraulic_interfaces.conversions import from_time
 HERE = Path(__file__).parent
 
 PLANTS: dict[str, tuple[str, ...]] = {
+    "can": (str(HERE / "can_plant.py"),),
     "integrator": (str(HERE.parent / "interfaces" / "integrator_plant.py"),),
     "sim": ("hydraulic_sim.nodes.simulator",),
 }
@@ -49,7 +50,12 @@ def enabled(client: Any, wait_until: Any) -> None:
 
 
 def applied(states: list[Any]) -> float:
-    return float(states[-1].effort[1]) if states else math.nan
+    """The drive in the newest state, in whole millivolts: a plant applies, and says, what its amplifier resolves."""
+    return millivolts(states[-1]) if states else math.nan
+
+
+def millivolts(state: Any) -> float:
+    return round(float(state.effort[1]), 3)
 
 
 def test_names_types_and_qos(start: Any, client: Any, wait_until: Any) -> None:
@@ -168,7 +174,7 @@ def test_out_of_range_is_clamped_and_nonsense_rejected(start: Any, client: Any, 
         lambda: strange.publish(JointState(name=["piston"], effort=[9.0])) or health.count("malformed") > 0,
         "wrongly named commands counted",
     )
-    assert {state.effort[1] for state in states} <= {0.0, 0.25}
+    assert {millivolts(state) for state in states} <= {0.0, 0.25}
     client.source("hand", 25.0)
     wait_until(lambda: applied(states) == 10.0, "the limit")
     wait_until(lambda: health.count("clamped") > 0, "clamping in the diagnostics")
@@ -183,7 +189,7 @@ def test_one_source_at_a_time(start: Any, client: Any, wait_until: Any) -> None:
     client.source("second", -0.5)
     wait_until(lambda: health.count("other_source") > 20, "a refused second source in the diagnostics")
     assert health["source"] == "first"
-    assert -0.5 not in {state.effort[1] for state in states}
+    assert -0.5 not in set(map(millivolts, states))
     first.stop()
     wait_until(lambda: applied(states) == -0.5, "the second source once the first is silent")
 

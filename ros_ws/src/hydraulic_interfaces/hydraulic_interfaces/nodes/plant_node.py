@@ -129,13 +129,17 @@ class PlantNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start the plant loop at 0 V."""
         self._ports.discard_commands()
+        # The loop collects before it starts, which takes long the first time: not while a plant waits to be stepped.
+        gc.collect()
+        gc.freeze()
         try:
             self._backend.activate()
             self._switch(self._table["enable_on_activate"])
         except Exception as error:
+            gc.unfreeze()
             self._complain(f"cannot activate: {error}")
             self.gate.enable(False)
-            self._backend.deactivate()
+            self._withdraw()
             return FAILURE
         self._loop = PlantLoop(self._backend, self.gate, self._ports, self._timing, self._last_stamp_ns)
         self._loop.start()
@@ -195,6 +199,12 @@ class PlantNode(LifecycleNode):
         if self._hung is None:  # else its thread is still at work in what would be released
             self._clean_up()
         self._state = "unconfigured"
+
+    def _withdraw(self) -> None:
+        try:
+            self._backend.deactivate()
+        except Exception as error:
+            self._complain(f"deactivating failed: {error}")
 
     def _clean_up(self) -> None:
         try:

@@ -1,0 +1,64 @@
+"""The CAN driver's node and virtual devices over the simulated actuator, in one process; takes the node's arguments.
+
+The bus file is the shipped one with more patience: what is tested here is the contract, on a machine that may be busy.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from hydraulic_can_driver.bus_file import SHIPPED, load_bus
+from hydraulic_can_driver.can_bus import open_can
+from hydraulic_can_driver.nodes import can_driver
+from hydraulic_can_driver.virtual import Reading, VirtualBench
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
+
+CHANGES: dict[str, dict[str, Any]] = {
+    "": {"interface": "virtual", "channel": "contract"},
+    "master": {"lost_after": 10.0},
+    "monitoring": {"missed_cycles": 1000, "sync_gap": 10.0, "state_change": 10.0, "heartbeats": 100},
+}
+
+
+class Actuator:
+    """The physics of a model file behind virtual devices."""
+
+    def __init__(self, model: str) -> None:
+        self._live = Plant(load_model(model)).live()
+
+    def step(self, drive: float, dt: float) -> Reading:
+        """See `hydraulic_can_driver.virtual.Plant`."""
+        now = self._live.step(drive, dt)
+        return Reading(now.position, now.velocity, now.pressure_a, now.pressure_b, now.pressure_supply, now.spool)
+
+
+def patient_file(folder: Path, changes: dict[str, dict[str, Any]] = CHANGES) -> Path:
+    """The shipped bus file with changes, by section ("" for the top)."""
+    yaml = YAML(typ="rt")
+    document = yaml.load(SHIPPED / "bench.yaml")
+    for section, values in changes.items():
+        (document[section] if section else document).update(values)
+    document["nodes"]["valve"]["receive"][0]["timeout"] = 10.0
+    document["nodes"]["valve"]["boot"].append({"object": 0x2201, "sub": 0, "type": "u16", "value": 10_000})
+    path = folder / "patient.yaml"
+    yaml.dump(document, path)
+    return path
+
+
+def main() -> int:
+    """Run the node until it is told to stop."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = patient_file(Path(folder))
+        bus = load_bus(path)
+        with VirtualBench(bus, open_can(bus.interface, bus.channel), Actuator("sample_bench")):
+            return can_driver.main([*sys.argv[1:], "--ros-args", "-p", f"bus:={path}"])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
