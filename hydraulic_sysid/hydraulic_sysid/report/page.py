@@ -30,7 +30,7 @@ SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
     "hydraulic_sysid.compare/1": compare_section.html,
     "hydraulic_sysid.design/1": design_section.html,
     "hydraulic_sysid.frequency_response/1": frequency_response_section.html,
-    "hydraulic_sysid.identify/1": identify_section.html,
+    "hydraulic_sysid.identify/2": identify_section.html,
 }
 
 
