@@ -71,8 +71,8 @@ def _response(result: Result, place: Figures) -> str:
     else:
         lead = (
             f"Welch's estimate over segments of {result['welch']['segment']:.3g} s, and the empirical transfer "
-            f"function estimate of the whole record, smoothed over {result['etfe']['width']:.2g} Hz. Noise and distortion "
-            "lower the coherence alike."
+            f"function estimate of the whole record, smoothed over {result['etfe']['width']:.2g} Hz. Noise and "
+            "distortion lower the coherence alike."
         )
     return section("Response", lead, place.place(figures.bode(result)))
 
