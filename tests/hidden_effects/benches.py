@@ -102,20 +102,24 @@ class Bench:
         }
 
 
-def make(bench: Bench, *, without: tuple[str, ...] = (), noise: bool = True) -> dict[str, dict[str, np.ndarray]]:
-    """The six records of a bench: experiment → columns (20000,) of `plant.COLUMNS`. ``without`` names hidden effects
-    to leave out (the same bench, noise and drive otherwise)."""
+def make(
+    bench: Bench, *, without: tuple[str, ...] = (), noise: bool = True, draw: str = "", names: tuple[str, ...] = ()
+) -> dict[str, dict[str, np.ndarray]]:
+    """The six records of a bench: experiment → columns (20000,) of `plant.COLUMNS`.
+
+    ``without`` names hidden effects to leave out (the same bench, noise and drive otherwise); another ``draw`` is
+    the same bench measured once more, with other noise and other random drives; ``names``: these experiments only.
+    """
     values = bench.plain()
     extra = bench.extra()
     for h in bench.hidden:
         if h.name not in without:
             values |= {key: extra[key] for key in h.values}
-    return {
-        name: plant.run(
-            values, experiments.drive(name, bench.rng(name)), bench.rng(f"{name} noise") if noise else None
-        )[0]
-        for name in experiments.NAMES
-    }
+    records = {}
+    for name in names or experiments.NAMES:
+        feed = experiments.drive(name, bench.rng(name + draw))
+        records[name] = plant.run(values, feed, bench.rng(f"{name}{draw} noise") if noise else None)[0]
+    return records
 
 
 def model_text(bench: Bench) -> str:
@@ -158,18 +162,23 @@ def model_text(bench: Bench) -> str:
     return "\n".join([*lines, "history: []", ""])
 
 
+def write_records(records: dict[str, dict[str, np.ndarray]], folder: Path) -> list[Path]:
+    """Write records as csv.gz into a folder; the paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, table in records.items():
+        time, u, x, pa, pb = (table[c].tolist() for c in plant.COLUMNS)
+        rows = [f"{a:.3f},{b:.4f},{c:.6f},{d:.0f},{e:.0f}" for a, b, c, d, e in zip(time, u, x, pa, pb, strict=True)]
+        text = "\n".join([",".join(plant.COLUMNS), *rows, ""])
+        paths.append(folder / f"{name}.csv.gz")
+        paths[-1].write_bytes(gzip.compress(text.encode(), compresslevel=1, mtime=0))
+    return paths
+
+
 def write(bench: Bench, folder: Path) -> Path:
     """Write the bench's records (csv.gz), the user's model.yaml and answer.json into ``folder``/name."""
     place = folder / bench.name
-    place.mkdir(parents=True, exist_ok=True)
-    for name, table in make(bench).items():
-        time, u, x, pa, pb = (table[c] for c in plant.COLUMNS)
-        rows = [
-            f"{a:.3f},{b:.4f},{c:.6f},{d:.0f},{e:.0f}"
-            for a, b, c, d, e in zip(time.tolist(), u.tolist(), x.tolist(), pa.tolist(), pb.tolist(), strict=True)
-        ]
-        text = "\n".join([",".join(plant.COLUMNS), *rows, ""])
-        (place / f"{name}.csv.gz").write_bytes(gzip.compress(text.encode(), compresslevel=1, mtime=0))
+    write_records(make(bench), place)
     (place / "model.yaml").write_text(model_text(bench))
     (place / "answer.json").write_text(json.dumps(bench.answer(), indent=1) + "\n")
     return place

@@ -103,7 +103,7 @@ _UNKNOWN = (
            what="dry friction that changes as the seals warm"),
     Hidden("hump_friction", FORCE, {"hump_friction": (350.0, 900.0), "hump_speed": (0.05, 0.05)},
            what="friction falls with speed beyond a maximum"),
-    Hidden("outside_shaker", FORCE, {"shaker": (400.0, 1000.0), "shaker_frequency": (1.7, 1.7)},
+    Hidden("outside_shaker", FORCE, {"shaker": (800.0, 1600.0), "shaker_frequency": (1.7, 1.7)},
            what="a force from a neighbouring machine"),
     Hidden("worn_barrel_leakage", FLOW, {"barrel_leakage": (3e-11, 1.5e-10), "barrel_length": (0.04, 0.05)},
            what="cross-port leakage at one place of the stroke"),

@@ -12,7 +12,7 @@ from . import experiments, parameters, solver
 POSITION_NOISE = 20e-6  # m, before the converter
 PRESSURE_NOISE = 15e3  # Pa
 COLUMNS = ("time_s", "command_V", "position_m", "pressure_a_Pa", "pressure_b_Pa")
-TRUTH = ("position", "velocity", "pressure_a", "pressure_b", "supply", "tank", "opening", "dry_work", "oil_a")
+TRUTH = ("position", "velocity", "pressure_a", "pressure_b", "supply", "tank", "opening")
 
 
 def run(

@@ -44,8 +44,8 @@ def acceleration(x, v, pa, pb, z, x2, v2, x3, v3, t, thin, p):
 
 @njit
 def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
-    """Fill ``out`` (n, 4): drive V, position m, pressures Pa, as recorded; ``truth`` (n, 9): position, velocity,
-    pressures, supply, tank, opening, and the energy and volume accounts [J, m³].
+    """Fill ``out`` (n, 4): drive V, position m, pressures Pa, as recorded; ``truth`` (n, 7): position, velocity,
+    pressures, supply, tank, opening.
 
     feed (n,) V before the feedback; noise (n,) each, m and Pa; start (5,): position, velocity, pressures, bristle.
     """
@@ -73,8 +73,6 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
     width = max(p.overlap, p.underlap)
     rounding = laws.EDGE * width
     shift = p.underlap - p.overlap
-    dry = 0.0
-    swallowed = 0.0
     for k in range(n):
         t0 = k * dt
         # --- what the sensors say
@@ -108,7 +106,7 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
         out[k, 2] = (1.0 + p.transducer_gain) * seen_a + p.offset_a + noise_a[k]
         out[k, 3] = seen_b + p.offset_b + noise_b[k]
         truth[k, 0], truth[k, 1], truth[k, 2], truth[k, 3] = x, v, pa, pb
-        truth[k, 4], truth[k, 5], truth[k, 6], truth[k, 7], truth[k, 8] = ps, pt, o, dry, swallowed
+        truth[k, 4], truth[k, 5], truth[k, 6] = ps, pt, o
         for j in range(SUBSTEPS):
             t = t0 + (j + 0.5) * h
             thin = laws.warmth(p, t)
@@ -189,8 +187,6 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
             pb += h * rate_b
             drawn = gain * (forward * root_pa + backward * root_pb)
             returned = gain * (backward * root_at + forward * root_bt)
-            # accounts: oil stored in A minus what the flows brought; work of dry friction and outer forces
-            swallowed += h * (p.area * v + ca * rate_a)
             # --- drift: positions, bristles
             x += h * v
             x2 += h * v2
@@ -202,7 +198,6 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
                 z = z * fade + v * (1.0 - fade) / bend
             else:
                 z += h * v
-            dry += h * v * p.coulomb / p.bristle * z
             # --- second half-kick, implicit in the speeds (slope by difference)
             a1, a2, a3 = acceleration(x, v, pa, pb, z, x2, v2, x3, v3, t + half, thin, p)
             dv = 1e-7

@@ -1,0 +1,136 @@
+"""How a diagnosis is judged: one verdict against one answer, and rates with their uncertainty over many.
+
+Knows the schema of a diagnosis (`verdict`, `effects`, `alternatives`, `subsystem`) and nothing of how it was made.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+MISSING, TIE, COMPLETE, OUTSIDE = "missing", "cannot be told apart", "complete", "outside the library"
+NEAR = 0.10  # of the true value, from the parameter's null
+AS_GOOD = 1.2  # held-out error over that of the true structure
+NULLS = {"sensor_scale.scale": 1.0}
+
+
+def named(result: dict[str, Any]) -> list[str]:
+    """Effects that the diagnosis says are there, the strongest first; none unless it says that some are missing."""
+    if result["verdict"]["kind"] not in (MISSING, TIE):
+        return []
+    return [e["name"] for e in sorted(result["effects"], key=lambda e: e["rank"])]
+
+
+def shortlist(result: dict[str, Any]) -> list[str]:
+    """The first three names: those it says are there, then the alternatives (declared ties among them)."""
+    names = named(result)
+    for entry in result.get("alternatives") or []:
+        found = entry if isinstance(entry, str) else entry["name"]
+        if found not in names:
+            names.append(found)
+    return names[:3]
+
+
+def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
+    """One bench's marks: which of the figures count for its kind, and whether each is met (see `RATES`)."""
+    kind = result["verdict"]["kind"]
+    true = list(answer["hidden"])
+    names = named(result)
+    marks: dict[str, Any] = {
+        "bench": answer["name"],
+        "kind": answer["kind"],
+        "severity": answer["severity"],
+        "true": true,
+        "verdict": kind,
+        "named": names,
+        "shortlist": shortlist(result),
+    }
+    if answer["kind"] == "none":
+        marks["silent"] = kind == COMPLETE
+    elif answer["kind"] == "single":
+        marks["right_first"] = kind == MISSING and names[:1] == true
+        marks["first_three"] = true[0] in marks["shortlist"]
+        marks["nothing_beside"] = set(names) <= {*true, *answer["companions"]}
+    elif answer["kind"] == "pair":
+        marks["both_found"] = kind in (MISSING, TIE) and set(true) <= set(names)
+        marks["one_found"] = bool(set(true) & set(names))
+    elif answer["kind"] == "unknown":
+        marks["said_so"] = kind == OUTSIDE
+        marks["right_subsystem"] = result.get("subsystem") in answer["subsystems_as_good"][0]
+    if answer["kind"] in ("single", "pair"):
+        marks["parameters"] = parameters(answer, result)
+    return marks
+
+
+def parameters(answer: dict[str, Any], result: dict[str, Any]) -> list[dict[str, Any]]:
+    """Found against true parameters of the effects that were rightly named: error relative to the distance of the
+    truth from the null value, and whether the 95 % interval covers. Parameters without a finite standard error
+    count as not identifiable and are left out."""
+    rows = []
+    for effect in result["effects"] if named(result) else []:
+        truth = answer["hidden"].get(effect["name"], {})
+        for p in effect["parameters"]:
+            key = p["key"].rpartition(".")[2]
+            if key not in truth or not _known(p):
+                continue
+            null = NULLS.get(f"{effect['name']}.{key}", 0.0)
+            error = (p["value"] - truth[key]) / (truth[key] - null)
+            low, high = p["interval"]
+            rows.append(
+                {
+                    "key": f"{effect['name']}.{key}",
+                    "true": truth[key],
+                    "value": p["value"],
+                    "relative_error": error,
+                    "near": abs(error) <= NEAR,
+                    "covered": low <= truth[key] <= high,
+                }
+            )
+    return rows
+
+
+def _known(p: dict[str, Any]) -> bool:
+    numbers = (p.get("value"), p.get("standard_error"), *(p.get("interval") or (None,)))
+    return all(isinstance(v, (int, float)) and math.isfinite(v) for v in numbers)
+
+
+def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
+    """95 % interval of a rate (Wilson 1927, J. Amer. Statist. Assoc. 22)."""
+    if count == 0:
+        return 0.0, 1.0
+    rate = hits / count
+    middle = (rate + z * z / (2 * count)) / (1 + z * z / count)
+    half = z / (1 + z * z / count) * math.sqrt(rate * (1 - rate) / count + z * z / (4 * count * count))
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+# figure → (title, what is wanted, mark it counts, whether it is the parameters' mark)
+RATES = {
+    "right_first": ("one hidden effect: right name first", "≥ 90 %"),
+    "first_three": ("one hidden effect: among the first three", "≥ 98 %"),
+    "nothing_beside": ("one hidden effect: nothing else named beside it", ""),
+    "false_alarms": ("nothing missing: false alarms", "≤ 5 %"),
+    "both_found": ("two hidden effects: both found", "≥ 80 %"),
+    "one_found": ("two hidden effects: at least one found", ""),
+    "said_so": ("unknown to the library: said so", "≥ 80 %"),
+    "right_subsystem": ("unknown to the library: right subsystem", "≥ 90 %"),
+    "near": ("parameters of the named effect within 10 %", "where identifiable"),
+    "covered": ("95 % intervals that cover the truth", "≥ 90 %"),
+    "as_good": ("held-out error ≤ 1.2 × that of the true structure refitted", "all"),
+}
+
+
+def rates(marks: list[dict[str, Any]]) -> dict[str, tuple[int, int]]:
+    """Figure of `RATES` → hits and cases."""
+    found = {}
+    for name in RATES:
+        if name == "false_alarms":
+            cases = [not m["silent"] for m in marks if "silent" in m]
+        elif name in ("near", "covered"):
+            cases = [p[name] for m in marks for p in m.get("parameters", [])]
+        elif name == "as_good":
+            cases = [m["held_out_ratio"] <= AS_GOOD for m in marks if m.get("held_out_ratio") is not None]
+        else:
+            cases = [m[name] for m in marks if name in m]
+        found[name] = (sum(cases), len(cases))
+    return found

@@ -1,0 +1,107 @@
+"""The catalogue: complete, independent of the project, visible in the records, and honest to the user."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hidden_effects import benches, catalogue, experiments, plant
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.registry import library
+
+HERE = Path(__file__).parent
+INDEPENDENT = ("parameters", "laws", "solver", "experiments", "plant", "catalogue", "benches")
+SHOWN_IN = ("steps", "fast", "long")
+NOISE = {"position_m": plant.POSITION_NOISE, "pressure_a_Pa": plant.PRESSURE_NOISE,
+         "pressure_b_Pa": plant.PRESSURE_NOISE}  # fmt: skip
+
+
+@pytest.mark.parametrize("module", INDEPENDENT)
+def test_the_plant_imports_nothing_of_the_project(module):
+    tree = ast.parse((HERE / f"{module}.py").read_text())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [a.name for a in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [] if node.level else [node.module or ""]
+        else:
+            continue
+        assert not [n for n in names if n.startswith("hydraulic")], names
+
+
+def test_every_effect_of_the_library_is_hidden_somewhere_and_compared_by_its_own_parameters():
+    every = library(())
+    assert set(catalogue.LIBRARY) == {name for name, e in every.items() if not e.always_on}
+    assert not set(catalogue.UNKNOWN) & set(every)
+    for hidden in catalogue.LIBRARY.values():
+        assert hidden.truth
+        assert set(hidden.truth.values()) <= {p.name for p in every[hidden.name].parameters}
+        assert set(hidden.companions) <= set(every)
+    for pair in catalogue.PAIRS:
+        assert set(pair) <= set(catalogue.LIBRARY)
+
+
+def test_names_are_unique_and_counts_suffice():
+    every = benches.every()
+    assert len({b.name for b in every}) == len(every)
+    kinds = [b.kind for b in every]
+    assert kinds.count("none") >= 10 and kinds.count("pair") >= 20 and kinds.count("unknown") >= 2 * 12
+    assert kinds.count("single") == 2 * len(catalogue.LIBRARY)
+
+
+@pytest.mark.parametrize("name", sorted(set(catalogue.EVERY) - set(benches.KNOWN.values())))
+def test_a_mild_effect_moves_a_channel_by_several_times_the_noise(name):
+    kind = "single" if name in catalogue.LIBRARY else "unknown"
+    bench = benches.Bench(kind, (name,), "mild", 1)
+    moved = 0.0
+    with_it = benches.make(bench, noise=False, names=SHOWN_IN)
+    without = benches.make(bench, noise=False, names=SHOWN_IN, without=(name,))
+    for record in SHOWN_IN:
+        for column, noise in NOISE.items():
+            moved = max(moved, np.abs(with_it[record][column] - without[record][column]).max() / noise)
+    assert moved > 3.0
+
+
+@pytest.mark.parametrize(
+    "bench",
+    [
+        benches.Bench("none", seed=1),
+        benches.Bench("single", ("coulomb_friction",), "strong", 1),
+        benches.Bench("single", ("viscosity_drift",), "mild", 1),
+        benches.Bench("pair", ("load_spring", "internal_leakage"), "strong", 1),
+    ],
+    ids=lambda b: b.name,
+)
+def test_the_users_model_is_the_data_sheet_without_what_is_hidden(bench, tmp_path):
+    path = tmp_path / "model.yaml"
+    path.write_text(benches.model_text(bench))
+    model = load_model(path)
+    assert set(model.effects) | {"end_stop"} == set(bench.known())
+    assert not set(bench.effects) & set(model.effects)
+    assert model.value("moving_mass") == bench.sheet()["mass"]
+    built = bench.plain()
+    for key in benches.SCATTERED:
+        assert 0.95 <= built[key] / bench.sheet()[key] <= 1.05
+    if "viscous_friction" in model.effects:
+        assert model.value("viscous_friction.coefficient") == bench.sheet()["viscous"]
+
+
+def test_a_bench_is_the_same_when_made_again_and_differs_when_measured_again():
+    bench = benches.Bench("single", ("valve_deadband",), "mild", 3)
+    one, two = (benches.make(bench, names=("steps",))["steps"] for _ in range(2))
+    assert all(np.array_equal(one[c], two[c]) for c in plant.COLUMNS)
+    new = benches.make(bench, names=("steps",), draw=" fresh")["steps"]
+    assert not np.array_equal(new["command_V"], one["command_V"])
+    assert bench.values() == benches.Bench("single", ("valve_deadband",), "mild", 3).values()
+    assert benches.Bench("single", ("valve_deadband",), "mild", 4).values() != bench.values()
+
+
+def test_written_records_hold_the_columns(tmp_path):
+    bench = benches.Bench("none", seed=2)
+    paths = benches.write_records(benches.make(bench, names=("chirp",)), tmp_path)
+    table = np.loadtxt(paths[0], delimiter=",", skiprows=1)
+    assert table.shape == (experiments.times().size, len(plant.COLUMNS))
+    assert table[-1, 0] == pytest.approx(19.999)

@@ -1,0 +1,105 @@
+"""The judge's rules, on made-up diagnoses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hidden_effects import benches, matrix, scoring
+
+DEADBAND = {
+    "name": "b", "kind": "single", "severity": "mild", "hidden": {"valve_deadband": {"width": 0.02}},
+    "companions": [], "subsystems_as_good": [["valve"]],
+}  # fmt: skip
+
+
+def effect(name: str, rank: int = 1, **parameters: tuple[float, float]) -> dict[str, Any]:
+    rows = [
+        {"key": f"{name}.{k}", "value": v, "standard_error": e, "interval": [v - 1.96 * e, v + 1.96 * e], "unit": "1"}
+        for k, (v, e) in parameters.items()
+    ]
+    return {"name": name, "rank": rank, "parameters": rows}
+
+
+def said(kind: str, *effects: dict[str, Any], alternatives: tuple[str, ...] = (), subsystem: str | None = None):
+    return {
+        "verdict": {"kind": kind, "text": ""},
+        "effects": list(effects),
+        "alternatives": [{"name": n} for n in alternatives],
+        "subsystem": subsystem,
+    }
+
+
+def test_the_right_name_counts_first_only_as_missing():
+    right = scoring.judge(DEADBAND, said("missing", effect("valve_deadband")))
+    assert right["right_first"] and right["first_three"] and right["nothing_beside"]
+    tie = scoring.judge(DEADBAND, said(scoring.TIE, effect("valve_deadband"), alternatives=("backlash",)))
+    assert not tie["right_first"] and tie["first_three"]
+
+
+def test_rank_decides_not_order_and_the_fourth_is_too_late():
+    second = said("missing", effect("valve_deadband", 2), effect("backlash", 1))
+    marks = scoring.judge(DEADBAND, second)
+    assert not marks["right_first"] and marks["first_three"] and not marks["nothing_beside"]
+    late = said("missing", effect("backlash"), alternatives=("presliding", "sensor_lag", "valve_deadband"))
+    assert not scoring.judge(DEADBAND, late)["first_three"]
+
+
+@pytest.mark.parametrize("kind", ["complete", "outside the library", "failed"])
+def test_other_verdicts_name_nothing(kind):
+    marks = scoring.judge(DEADBAND, said(kind, effect("valve_deadband")))
+    assert not marks["right_first"] and not marks["first_three"] and marks["parameters"] == []
+
+
+def test_parameters_are_compared_where_they_are_told():
+    near = said("missing", effect("valve_deadband", width=(0.0215, 1e-3)))
+    row = scoring.judge(DEADBAND, near)["parameters"][0]
+    assert row["near"] and row["covered"] and row["relative_error"] == pytest.approx(0.075)
+    far = said("missing", effect("valve_deadband", width=(0.0225, 1e-3)))
+    row = scoring.judge(DEADBAND, far)["parameters"][0]
+    assert not row["near"] and not row["covered"]
+    blind = said("missing", effect("valve_deadband", width=(0.0225, float("nan"))))
+    assert scoring.judge(DEADBAND, blind)["parameters"] == []
+
+
+def test_a_scale_is_judged_by_its_distance_from_one():
+    answer = DEADBAND | {"hidden": {"sensor_scale": {"scale": 1.03}}, "subsystems_as_good": [["sensor"]]}
+    row = scoring.judge(answer, said("missing", effect("sensor_scale", scale=(1.02, 0.01))))["parameters"][0]
+    assert row["relative_error"] == pytest.approx(-1 / 3) and not row["near"]
+
+
+def test_pairs_unknowns_and_nothing():
+    pair = DEADBAND | {"kind": "pair", "hidden": {"valve_deadband": {}, "entrained_air": {}}}
+    both = scoring.judge(pair, said("missing", effect("entrained_air"), effect("valve_deadband", 2)))
+    one = scoring.judge(pair, said("missing", effect("entrained_air")))
+    assert both["both_found"] and not one["both_found"] and one["one_found"]
+    unknown = DEADBAND | {"kind": "unknown", "hidden": {"hose_creep": {}}, "subsystems_as_good": [["fluid", "flow"]]}
+    marks = scoring.judge(unknown, said(scoring.OUTSIDE, subsystem="flow"))
+    assert marks["said_so"] and marks["right_subsystem"]
+    none = DEADBAND | {"kind": "none", "hidden": {}}
+    alarm = scoring.judge(none, said("missing", effect("backlash")))
+    quiet = scoring.judge(none, said("complete"))
+    assert scoring.rates([alarm, quiet])["false_alarms"] == (1, 2)
+
+
+def test_wilson_interval():
+    low, high = scoring.wilson(9, 10)
+    assert (low, high) == (pytest.approx(0.5958, abs=1e-4), pytest.approx(0.9821, abs=1e-4))
+    assert scoring.wilson(0, 0) == (0.0, 1.0)
+
+
+def test_selection_and_page(tmp_path):
+    chosen = matrix.select("single", "mild", ["valve_deadband"])
+    assert [b.name for b in chosen] == ["valve_deadband-mild-s1"]
+    assert [b.name for b in matrix.select("single", "mild", ["valve_deadband"], [7])] == ["valve_deadband-mild-s7"]
+    assert {b.kind for b in matrix.select(only=["none"])} == {"none"}
+    with pytest.raises(ValueError, match="gravity"):
+        matrix.select(only=["gravity"])
+    bench = benches.Bench("single", ("valve_deadband",), "mild", 1)
+    width = bench.truth()["valve_deadband"]["width"]
+    marks = scoring.judge(bench.answer(), said("missing", effect("valve_deadband", width=(width, 1e-4))))
+    page = matrix.document([{"marks": marks, "seconds": 12.0}], "the command")
+    assert "    the command" in page and "| valve_deadband | 1 | valve_deadband |" in page
+    assert "| one hidden effect: right name first | ≥ 90 % | 1/1 = 100 % | 21…100 % |" in page
+    assert matrix.gather([bench], tmp_path) == []
