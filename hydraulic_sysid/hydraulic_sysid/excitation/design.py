@@ -28,6 +28,7 @@ from hydraulic_sysid.excitation.signals.steps import Steps
 from hydraulic_sysid.excitation.signals.triangle import Triangle
 
 _FADE_S = 0.5
+_APPROACH_S = 8.0  # from anywhere in the stroke, whatever was played before
 _PERIODS = 4  # of a periodic signal within the duration, one of them to settle in
 _PRBS_3_DB = 0.44  # of the clock frequency, where the power of a binary sequence is 3 dB down
 _HARMONICS = 5.0  # a wave with corners reaches to the end of the band with its fifth harmonic
@@ -108,4 +109,5 @@ def propose(name: str, wish: Wish) -> Plan:
         rate=wish.rate,
         fade_in=fade,
         fade_out=fade,
+        approach=_APPROACH_S,
     )

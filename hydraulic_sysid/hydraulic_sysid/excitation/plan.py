@@ -29,7 +29,9 @@ class Plan(Settings):
     """What is played: a signal, how it is faded in and out, centred and bounded.
 
     The drive without centring is w(t)·(offset + signal(t)), where w is 0 during both rests and rises and
-    falls as a raised cosine within `duration`. Two equal plans give equal arrays, on any machine.
+    falls as a raised cosine within `duration`. Two equal plans give equal arrays, on any machine. In the
+    `approach` before all that the piston is brought to the centre, from wherever it stands; there the travel
+    limit does not count.
     """
 
     label = ""
@@ -57,6 +59,11 @@ class Plan(Settings):
     )
     centring_gain: float = number("V/m", "drive per distance from the centre", 2.0, minimum=0.0, maximum=1000.0)
     centring_limit: float = number("V", "centring asks for no more", 0.5, minimum=0.0, maximum=DRIVE_LIMIT_V)
+    approach: float = number(
+        "s", "brings the piston to the centre before the first rest", 0.0, minimum=0.0, maximum=60.0
+    )
+    approach_gain: float = number("V/m", "drive per distance during the approach", 20.0, minimum=0.0, maximum=1000.0)
+    approach_limit: float = number("V", "the approach asks for no more", 3.0, minimum=0.0, maximum=DRIVE_LIMIT_V)
     prediction: Prediction | None = section("what a model does under this plan", Prediction, None)
 
     def check(self) -> None:
@@ -88,9 +95,14 @@ class Plan(Settings):
         return self.duration
 
     @property
+    def signal_start(self) -> float:
+        """Where the signal begins [s], from the start of the run."""
+        return self.approach + self.rest_before
+
+    @property
     def total_time(self) -> float:
-        """Duration of the run [s], rests included."""
-        return self.rest_before + self.active_time + self.rest_after
+        """Duration of the run [s], approach and rests included."""
+        return self.signal_start + self.active_time + self.rest_after
 
     @cached_property
     def time(self) -> Array:
@@ -100,7 +112,7 @@ class Plan(Settings):
     @cached_property
     def envelope(self) -> Array:
         """The weight w of signal and centring, 0 … 1, (N,)."""
-        since, left = self.time - self.rest_before, self.rest_before + self.active_time - self.time
+        since, left = self.time - self.signal_start, self.signal_start + self.active_time - self.time
         slack = 1e-6 / self.rate
         active = (since > -slack) & (left > slack)
         return np.where(active, _raised_cosine(since, self.fade_in) * _raised_cosine(left, self.fade_out), 0.0)
@@ -110,7 +122,9 @@ class Plan(Settings):
         """The drive without centring [V], (N,)."""
         active = self.envelope > 0.0
         drive = np.zeros(self.time.size)
-        drive[active] = self.envelope[active] * (self.offset + self.signal.sample(self.time[active] - self.rest_before))
+        drive[active] = self.envelope[active] * (
+            self.offset + self.signal.sample(self.time[active] - self.signal_start)
+        )
         return drive
 
     @classmethod

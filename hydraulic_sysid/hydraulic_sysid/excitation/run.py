@@ -28,6 +28,8 @@ class ExcitationRun:
     without it the piston drifts to a stop. It is meant to be weak: k_c times the velocity gain is far below
     the lowest frequency of interest. What it adds is part of the applied drive, and so of the record.
 
+    During the plan's approach the drive is u = −k_a·(x − x_c), clamped to the plan's `approach_limit`.
+
     The drive comes from the time of the state, not from a count of calls: a lost state shortens nothing. The
     run aborts — 0 V at once — on a position that is no number, beyond the travel limit or too old, and on a
     drive that the plant does not apply. It never moves again after that. While no state comes nothing is
@@ -42,6 +44,7 @@ class ExcitationRun:
         self.reason = ""
         self.drive = 0.0
         self.played = 0
+        self._approach = round(plan.approach * plan.rate)  # samples
         self._state_timeout = state_timeout
         self._applied_check = applied_check
         # Lists of floats: indexing an array costs ten times more.
@@ -111,7 +114,7 @@ class ExcitationRun:
         self.check_age(t - self._time)
         if not math.isfinite(position):
             self.abort(f"the position is {position}")
-        elif abs(position - plan.centre) > plan.travel_limit:
+        elif abs(position - plan.centre) > plan.travel_limit and self._index >= self._approach:
             limits = f"{plan.centre - plan.travel_limit:.4f} … {plan.centre + plan.travel_limit:.4f} m"
             self.abort(f"the piston is at {position:.4f} m (allowed: {limits})")
         if applied is not None and self._applied_check is not None:
@@ -128,6 +131,10 @@ class ExcitationRun:
             return
         self.played += index > self._index
         self._index = index
+        if index < self._approach:
+            limit = plan.approach_limit
+            self.drive = min(max(-plan.approach_gain * (position - plan.centre), -limit), limit)
+            return
         pull = -plan.centring_gain * (position - plan.centre)
         pull = min(max(pull, -plan.centring_limit), plan.centring_limit)
         drive = self._open_loop[index] + self._envelope[index] * pull

@@ -66,8 +66,8 @@ def periods_of(
         if known is None:
             raise FrequencyResponseError(f"{record.name}: no plan with a period is known of it; give its period")
         plan, period, harmonics = known
-        start = plan.rest_before + plan.fade_in
-        end = min(plan.rest_before + plan.active_time - plan.fade_out, end)
+        start = plan.signal_start + plan.fade_in
+        end = min(plan.signal_start + plan.active_time - plan.fade_out, end)
     size = round(period / record.dt)
     if abs(size * record.dt - period) > 1e-6 * period:
         raise FrequencyResponseError(

@@ -136,7 +136,7 @@ def _run(options: argparse.Namespace, console: Console) -> int:
     model = load_model(options.model)
     if options.record:
         records = read_all([Path(p) for p in options.record], options.columns)
-    out = _folder(options.out)
+    out = new_folder(options.out, "demo")
     begun = time.monotonic()
     if options.record:
         console.print(f"comparing {model.name} with {len(records)} record(s); results in {out}", soft_wrap=True)
@@ -162,9 +162,10 @@ def _run(options: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def _folder(wanted: Path | None) -> Path:
+def new_folder(wanted: Path | None, name: str) -> Path:
+    """The folder of a run: a new one of that name, or the wanted one, which must be new or empty."""
     if wanted is None:
-        return online.timestamped_folder(RUNS, "demo")
+        return online.timestamped_folder(RUNS, name)
     if wanted.exists() and (not wanted.is_dir() or any(wanted.iterdir())):
         raise FileExistsError(f"--out {wanted}: it exists and is not empty; name a new folder")
     wanted.mkdir(parents=True, exist_ok=True)
