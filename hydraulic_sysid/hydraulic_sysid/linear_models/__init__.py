@@ -8,6 +8,7 @@ from .model import LinearModel
 from .model_file import read_linear_model, write_linear_model
 from .order_selection import CRITERIA, Candidate, best, try_orders
 from .poles import Pole
+from .recursive import RecursiveArx
 from .series import OFFSETS
 from .state_space import StateSpaceModel
 from .structures import Arx, StateSpace, Structure, TransferFunction
@@ -29,6 +30,7 @@ __all__ = [
     "best",
     "try_orders",
     "Pole",
+    "RecursiveArx",
     "OFFSETS",
     "StateSpaceModel",
     "Arx",

@@ -104,7 +104,8 @@ def _figure(value: float | None, unit: str, factor: float = 1.0, digits: int = 3
     """A fit in percent or an error; a dash where an unstable model has none."""
     if value is None or value != value:
         return "–"
-    return f"{value:.2f}{unit}".replace(" ", "\u00a0").replace("-", "−") if unit else f"{value * factor:.{digits}g}".replace("-", "−")
+    shown = f"{value:.2f}{unit}".replace(" ", "\u00a0") if unit else f"{value * factor:.{digits}g}"
+    return shown.replace("-", "−")
 
 
 def _mean(part: Result, key: str) -> float | None:

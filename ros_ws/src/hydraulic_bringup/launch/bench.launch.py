@@ -26,6 +26,7 @@ ARGUMENTS = (
     ("enable", "false", "let commands through as soon as the plant is active"),
     ("record", "", "folder of a new bag; empty: nothing is recorded"),
     ("experiment", "", "excitation plan (file or shipped name) to play; empty: none"),
+    ("estimate", "false", "run the estimator beside the plant, with the same model"),
 )
 
 
@@ -56,6 +57,8 @@ def _nodes(context, *_args, **_kwargs):
     if value["record"]:
         settings = {"output": value["record"], "stop_on_experiment_end": bool(value["experiment"])}
         actions.append(_node("recorder", settings))
+    if value["estimate"].lower() in ("true", "1", "yes"):
+        actions.append(_node("estimator", {"model": value["model"]}))
     if value["experiment"]:
         settings = {"plan": value["experiment"], "autostart": True, "listeners": 2 if value["record"] else 1}
         actions.append(_node("excitation", settings))

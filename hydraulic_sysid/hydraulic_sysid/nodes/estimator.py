@@ -1,0 +1,145 @@
+"""Node `/actuator/estimator`: what the plant is, while it runs.
+
+Two estimates beside the plant, on the drive that was applied: a recursive ARX model of its own, whose coefficients,
+poles and one-step fit come out at the model's sampling time (`model_parameters`, `model_poles`, `model_fit`); and the
+physical model of the model file (`predicted_state`, `residual`, stamps of the state). `~/reset_covariance` lets the
+ARX model learn anew, `~/save` writes it to a file.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from hydraulic_interfaces.contract import ESTIMATOR_NODE, NAMESPACE
+from hydraulic_interfaces.conversions import MessageError, StateEncoder, sample_from_messages
+from hydraulic_interfaces.nodes.parameters import ParameterTable
+from hydraulic_interfaces.nodes.serving import ServedNode, serve
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_interfaces.qos import STREAM_HISTORY, profile
+from hydraulic_interfaces.samples import PlantSample
+from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.linear_models import ArxOrder, IdentificationError
+from hydraulic_sysid.nodes import _estimator_messages as messages
+from hydraulic_sysid.online import LiveModel, RunningArx
+
+PARAMETERS = (
+    ParameterSpec("model", "moog_mcr_m_1002_bench", "model file or preset run beside the plant; empty: none"),
+    ParameterSpec("horizon", 1.0, "it starts from the measurement this often; 0: once", "s", 0.0, 3600.0, live=True),
+    ParameterSpec("na", 3, "past outputs of the ARX model", "", 1, 10),
+    ParameterSpec("nb", 3, "past inputs", "", 1, 10),
+    ParameterSpec("nk", 1, "dead time in samples", "", 1, 50),
+    ParameterSpec("sampling_time", 0.05, "of the ARX model", "s", 0.001, 10.0),
+    ParameterSpec("forgetting", 0.998, "weight of a sample falls by this per sample", "", 0.5, 1.0, live=True),
+    ParameterSpec("reset_period", 0.0, "covariance reset this often; 0: only when asked for", "s", 0.0, 1e6, live=True),
+    ParameterSpec("output", "position", "what is modelled: position, velocity or force"),
+    ParameterSpec("save_to", "", "file that ~/save writes the ARX model to", live=True),
+)
+HEALTH_S = 0.5
+SILENCE_S = 1.0
+GAP_NS = 20_000_000
+
+
+class Estimator(ServedNode):
+    """Parameters, topics and services around a `RunningArx` and a `LiveModel`."""
+
+    def __init__(self, **options: Any) -> None:
+        """:raises ValueError: a model or an order that cannot be used."""
+        super().__init__(ESTIMATOR_NODE, namespace=NAMESPACE, **options)
+        self._table = ParameterTable(self, PARAMETERS, self._apply, locked=lambda: True)
+        values = self._table.values()
+        order = ArxOrder(values["na"], values["nb"], values["nk"])
+        self._arx = RunningArx(order, values["sampling_time"], values["forgetting"], values["output"], GAP_NS)
+        self._live: LiveModel | None = None
+        if values["model"]:
+            self._live = LiveModel(load_model(values["model"]), values["horizon"], GAP_NS * 1e-9)
+        # The model's two streams go out at the rate of the state, as bytes that were serialised once.
+        self._streams = [
+            (self.create_publisher(JointState, name, profile(name, STREAM_HISTORY)), StateEncoder())
+            for name in ("predicted_state", "residual")
+        ]
+        self._told = {
+            name: self.create_publisher(JointState, name, profile(name))
+            for name in ("model_parameters", "model_poles", "model_fit")
+        }
+        self._health = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
+        self.create_subscription(JointState, "state", self._on_state, profile("state", STREAM_HISTORY))
+        self.create_timer(HEALTH_S, self._tell_health)
+        self.create_service(Trigger, "~/reset_covariance", self._on_reset)
+        self.create_service(Trigger, "~/save", self._on_save)
+        self._heard = self._reset_at = time.monotonic()
+        self._reset_period = values["reset_period"]
+        self._count = self._bad = 0
+
+    def _apply(self, name: str, value: Any) -> None:
+        if name == "forgetting":
+            self._arx.set_forgetting(value)
+        elif name == "reset_period":
+            self._reset_period = value
+        elif name == "horizon" and self._live is not None:
+            self._live.horizon = value
+
+    def watch(self) -> None:
+        """What must happen without a message: the reset that is due."""
+        if self._reset_period and time.monotonic() - self._reset_at >= self._reset_period:
+            self._reset()
+
+    def _on_state(self, message: JointState) -> None:
+        try:
+            self._take(sample_from_messages(message))
+        except MessageError as error:
+            self._bad += 1
+            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+
+    def _take(self, sample: PlantSample) -> None:
+        self._heard, self._count = time.monotonic(), self._count + 1
+        pair = self._live.take(sample) if self._live is not None else None
+        for (publisher, encode), values in zip(self._streams, pair or (), strict=False):
+            publisher.publish(encode(values))
+        output = getattr(sample, self._arx.output)
+        if not math.isfinite(output):
+            return
+        for stamp_ns, step in self._arx.take(sample.stamp_ns, sample.drive, output):
+            self._told["model_parameters"].publish(messages.parameters(self._arx.estimate, stamp_ns))
+            self._told["model_poles"].publish(messages.poles(self._arx.estimate, stamp_ns))
+            self._told["model_fit"].publish(messages.fit(step, self._arx.fit, stamp_ns))
+
+    def _tell_health(self) -> None:
+        silent = time.monotonic() - self._heard > SILENCE_S
+        arx = self._arx.estimate
+        text = "no state of the plant" if silent else f"{arx.order.text} after {arx.updates} samples"
+        figures: dict[str, object] = {"states": self._count, "not_a_state": self._bad, "updates": arx.updates}
+        figures |= {"one_step_fit_percent": f"{self._arx.fit.best_fit:.2f}", "certainty": f"{arx.certainty:.3g}"}
+        if self._live is not None:
+            figures |= {"model": self._live.plant.model.name, "restarts": self._live.restarts}
+        self._health.publish(messages.health(text, silent, figures, self.get_clock().now().nanoseconds))
+
+    def _reset(self) -> None:
+        self._arx.estimate.reset_covariance()
+        self._reset_at = time.monotonic()
+
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._reset()
+        response.success, response.message = True, f"{self._arx.estimate.order.text} learns anew"
+        return response
+
+    def _on_save(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.success, response.message = True, f"wrote {self._arx.save(self._table['save_to'])}"
+        except (IdentificationError, OSError) as error:
+            response.success, response.message = False, f"not saved: {error}"
+        return response
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; exit code 0, 2 for a bad parameter or model."""
+    return serve(Estimator, "Estimate a model of the actuator while it runs.", PARAMETERS, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
