@@ -40,7 +40,7 @@ def keyword(call: ast.Call, name: str) -> Any:
 
 def test_arguments_are_described_and_have_defaults() -> None:
     arguments = constant("ARGUMENTS")
-    assert [name for name, _, _ in arguments] == ["plant", "model", "params", "enable", "record", "experiment"]
+    assert [name for name, _, _ in arguments] == ["plant", "model", "params", "enable", "record", "experiment", "estimate"]
     assert all(isinstance(default, str) and text for _, default, text in arguments)
     defaults = {name: default for name, default, _ in arguments}
     assert defaults["plant"] in constant("PLANTS")
@@ -65,7 +65,7 @@ def test_nodes_have_the_names_of_the_contract() -> None:
     (other,) = calls("Node")
     assert keyword(other, "namespace") == contract.NAMESPACE
     started = {call.args[0].value for call in calls("_node") if isinstance(call.args[0], ast.Constant)}
-    assert started == {contract.RECORDER_NODE, contract.EXCITATION_NODE}
+    assert started == {contract.RECORDER_NODE, contract.EXCITATION_NODE, contract.ESTIMATOR_NODE}
     for executable in started:
         assert (ROOT / "hydraulic_sysid/hydraulic_sysid/nodes" / f"{executable}.py").is_file()
 
@@ -74,12 +74,13 @@ def test_parameters_that_are_set_are_declared() -> None:
     pytest.importorskip("rclpy")
     from hydraulic_interfaces.nodes import plant_node
     from hydraulic_sim.nodes import simulator
-    from hydraulic_sysid.nodes import excitation, recorder
+    from hydraulic_sysid.nodes import estimator, excitation, recorder
 
     declared = {
         "plant": {s.name for s in (*plant_node.PARAMETERS, *simulator.PARAMETERS)},
         "recorder": {s.name for s in recorder.PARAMETERS},
         "excitation": {s.name for s in excitation.PARAMETERS},
+        "estimator": {s.name for s in estimator.PARAMETERS},
     }
     keys = [
         {k.value for k in node.keys if isinstance(k, ast.Constant)}
@@ -87,7 +88,7 @@ def test_parameters_that_are_set_are_declared() -> None:
         if isinstance(node, ast.Dict) and node.lineno > TREE.body[-1].lineno - 60
     ]
     settings = [found for found in keys if found and not found & set(constant("PLANTS"))]
-    assert len(settings) == 3
+    assert len(settings) == 4
     for found in settings:
         assert any(found <= names for names in declared.values()), found
     file = yaml.safe_load((BRINGUP / "config/bench.yaml").read_text(encoding="utf-8"))
