@@ -40,7 +40,8 @@ def keyword(call: ast.Call, name: str) -> Any:
 
 def test_arguments_are_described_and_have_defaults() -> None:
     arguments = constant("ARGUMENTS")
-    assert [name for name, _, _ in arguments] == ["plant", "model", "params", "enable", "record", "experiment", "estimate"]
+    names = [name for name, _, _ in arguments]
+    assert names == ["plant", "model", "params", "enable", "record", "experiment", "estimate"]
     assert all(isinstance(default, str) and text for _, default, text in arguments)
     defaults = {name: default for name, default, _ in arguments}
     assert defaults["plant"] in constant("PLANTS")
@@ -132,6 +133,7 @@ def test_it_describes_its_arguments(description: ModuleType) -> None:
     [
         ({}, ["simulator"]),
         ({"plant": "can"}, ["can_driver"]),
+        ({"estimate": "true"}, ["simulator", "estimator"]),
         ({"record": "/tmp/bag", "experiment": "chirp"}, ["simulator", "recorder", "excitation"]),
     ],
 )
