@@ -18,7 +18,8 @@ _TRAVEL_SHARE = 0.8
 _DRIVE_SHARE = 0.95
 _SPEED_SHARE = 0.9
 _CAVITATION_PA = 0.2e6
-_STEPS = 9
+_STEPS = 12
+_TOO_MUCH = 2.0
 _TOLERANCE = 0.01
 
 
@@ -49,19 +50,22 @@ class Limits:
             pressure_max=1.25 * model.value("supply_pressure") if hydraulic else float("inf"),
         )
 
-    def broken(self, seen: Rehearsal, centre: float) -> str:
-        """Which limit a rehearsal breaks first in this list; empty when none."""
-        extremes = seen.extremes
-        travel = max(extremes.position_max - centre, centre - extremes.position_min)
-        if seen.aborted or travel > self.travel:
-            return "travel"
-        if extremes.drive_peak > self.drive:
-            return "drive"
-        if extremes.velocity_peak > self.velocity:
-            return "velocity"
-        if extremes.pressure_min < self.pressure_min:
-            return "cavitation"
-        return "pressure" if extremes.pressure_max > self.pressure_max else ""
+    def used(self, seen: Rehearsal, centre: float) -> dict[str, float]:
+        """Which part of each limit a rehearsal uses; above 1 it breaks the limit.
+
+        Of the pressures it is the part of the way from where they begin.
+        """
+        extremes, start = seen.extremes, float(seen.record["pressure_a"][0])
+        parts = {
+            "travel": max(extremes.position_max - centre, centre - extremes.position_min) / self.travel,
+            "drive": extremes.drive_peak / self.drive,
+            "velocity": extremes.velocity_peak / self.velocity,
+        }
+        if self.pressure_min < start:
+            parts["cavitation"] = (start - extremes.pressure_min) / (start - self.pressure_min)
+        if start < self.pressure_max:
+            parts["pressure"] = (extremes.pressure_max - start) / (self.pressure_max - start)
+        return parts
 
 
 @dataclass(frozen=True)
@@ -92,46 +96,51 @@ def largest(plan: Plan, model: Model, limits: Limits | None = None, share: float
     best: Sized | None = None
     factor = high
     for _ in range(_STEPS):
-        seen, why = _try(plan, plant, limits, factor)
-        if not why:
+        seen, part, why = _try(plan, plant, limits, factor)
+        if part <= 1.0:
             best, low = seen, factor
-            if factor >= high * (1.0 - _TOLERANCE):
+            if part >= 1.0 - _TOLERANCE or factor >= high:
                 break
         else:
             high, limit = factor, why
-        if low > 0.0 and high - low < _TOLERANCE * low:
+        if high - low < _TOLERANCE * low or high * peak < 1e-3 * limits.drive:
             break
-        factor = 0.5 * (low + high) if low > 0.0 else 0.4 * high
-        if factor * peak < 1e-3 * limits.drive:
-            break
+        # What is used of a limit grows about as the amplitude; the bracket holds where it does not.
+        factor = factor * (1.0 - 0.5 * _TOLERANCE) / part
+        if not low < factor < high:
+            factor = 0.5 * (low + high)
     if best is None:
         raise ExcitationError(
             f"{plan.name}: no amplitude down to {factor * peak:.3g} V keeps within the limits; {limit} breaks first: "
             "take a higher lowest frequency or wider limits"
         )
     if share < 1.0:
-        best, why = _try(plan, plant, limits, share * low)
+        best, part, why = _try(plan, plant, limits, share * low)
         limit = f"{share:.0%} of what {limit} allows"
-        if why or best is None:
+        if part > 1.0:
             raise ExcitationError(f"{plan.name}: at {share:.0%} of the largest amplitude {why} breaks")
     assert best is not None
     prediction: Prediction = replace(best.rehearsal.extremes, limited_by=limit)
     return Sized(replace(best.plan, prediction=prediction), best.rehearsal)
 
 
-def _try(plan: Plan, plant: Plant, limits: Limits, factor: float) -> tuple[Sized | None, str]:
-    """The plan `factor` times as large and rehearsed; and the limit that it breaks."""
+def _try(plan: Plan, plant: Plant, limits: Limits, factor: float) -> tuple[Sized | None, float, str]:
+    """The plan `factor` times as large and rehearsed; the largest part it uses of a limit, and of which."""
     try:
         signal = plan.signal.scaled(factor)
         # The run stops a little beyond the limit that the rehearsal keeps: sensors are noisy.
         bounded = replace(plan, signal=signal, amplitude_limit=limits.drive, travel_limit=1.1 * limits.travel)
     except PlanError:
-        return None, "drive"
+        return None, _TOO_MUCH, "drive"
     try:
         rehearsal = rehearse(bounded, plant)
     except SimulationError:
-        return None, "the model, which no step follows there,"
-    return Sized(bounded, rehearsal), limits.broken(rehearsal, plan.centre)
+        return None, _TOO_MUCH, "the model, which no step follows there,"
+    parts = limits.used(rehearsal, plan.centre)
+    if rehearsal.aborted and max(parts.values()) <= 1.0:
+        return None, _TOO_MUCH, rehearsal.aborted
+    why = max(parts, key=lambda name: parts[name])
+    return Sized(bounded, rehearsal), parts[why], why
 
 
 def _peak(plan: Plan) -> float:

@@ -18,6 +18,7 @@ from . import (
     design_section,
     frequency_response_section,
     identify_section,
+    paper_section,
 )
 from .html import Figures, tag, text
 
@@ -31,6 +32,7 @@ SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
     "hydraulic_sysid.design/1": design_section.html,
     "hydraulic_sysid.frequency_response/1": frequency_response_section.html,
     "hydraulic_sysid.identify/2": identify_section.html,
+    "hydraulic_sysid.paper/1": paper_section.html,
 }
 
 

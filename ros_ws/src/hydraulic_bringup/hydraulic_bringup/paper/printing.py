@@ -1,0 +1,70 @@
+"""The study on the terminal: the paper's figures in brackets beside ours."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from hydraulic_sysid.display import number
+
+
+def show(result: dict[str, Any], console: Console) -> None:
+    """Print the tables of a study's document."""
+    _models(result, console)
+    _thesis(result, console)
+    _grid(result, console)
+    console.print(result["verdict"]["text"])
+
+
+def _models(result: dict[str, Any], console: Console) -> None:
+    table = Table(title="models (the paper's figures in brackets)", title_justify="left")
+    for title in ("excitation", "model", "best fit, held out", "MSE [mm²]", "FPE [mm²]"):
+        table.add_column(title, justify="left" if title in ("excitation", "model") else "right")
+    for r in result["models"]:
+        table.add_row(
+            r["excitation"],
+            r["model"],
+            f"{_fit(r['best_fit'])} ({r['printed_best_fit']:.2f} %)",
+            f"{r['mse_mm2']:.2g} ({r['printed_mse']:g})",
+            f"{r['fpe_mm2']:.2g} ({r['printed_fpe']:g})",
+        )
+    for r in result["reviewed"]:
+        fits = ", ".join(f"{fit:g} %" for fit in r["best_fit"])
+        table.add_row(r["excitation"], f"{r['model']} ({r['authors']})", f"({fits})", "", "")
+    console.print(table)
+
+
+def _thesis(result: dict[str, Any], console: Console) -> None:
+    table = Table(title="the thesis: excitation over the bandwidth", title_justify="left")
+    for title in ("excitation", "band", "best fit in the paper's band", "RMSE over the grid [mm]"):
+        table.add_column(title, justify="left" if title == "excitation" else "right")
+    for r in result["thesis"]["rows"]:
+        low, high = r["band_over_bandwidth"]
+        table.add_row(r["name"], f"{low:g} … {high:g}", _fit(r["best_fit_in_band"]), _mm(r["rmse"]))
+    for name, why in result["not_fitted"].items():
+        table.add_row(name, "", "no model", why)
+    console.print(table)
+
+
+def _grid(result: dict[str, Any], console: Console) -> None:
+    names = [r["name"] for r in result["thesis"]["rows"]]
+    table = Table(title="RMSE against the nonlinear plant [mm]", title_justify="left")
+    for title in ("signal", "V", "Hz", *names):
+        table.add_column(title.replace("_", " "), justify="left" if title == "signal" else "right")
+    for cell in result["grid"]:
+        values = [_mm(cell["models"][name]["rmse"]) for name in names]
+        table.add_row(cell["shape"], number(cell["amplitude"]), number(cell["frequency"]), *values)
+    for row in result["recorded"]:
+        values = [_mm(row["models"][name]["rmse"]) if name in row["models"] else "" for name in names]
+        table.add_row(row["name"].replace("validation_", "recorded "), "", "", *values)
+    console.print(table)
+
+
+def _fit(value: float | None) -> str:
+    return "unstable" if value is None or value != value else f"{value:.2f} %".replace("-", "−")
+
+
+def _mm(value: float | None) -> str:
+    return "unstable" if value is None or value != value else f"{1e3 * value:.3f}"
