@@ -54,7 +54,10 @@ class VirtualBench:
         self._thread: threading.Thread | None = None
         self._own_bus = line is None
         self._own_notifier = not isinstance(line, canopen.Network)
-        self.network = line if isinstance(line, canopen.Network) else canopen.Network(line or open_can(bus.interface, bus.channel, bus.bitrate))
+        if isinstance(line, canopen.Network):
+            self.network = line
+        else:
+            self.network = canopen.Network(line or open_can(bus.interface, bus.channel, bus.bitrate))
         wiring = Wiring(self.network, bus, self._lock, self._tell, self._settle)
         self.devices: dict[str, Device] = {}
         for name, spec in bus.nodes.items():

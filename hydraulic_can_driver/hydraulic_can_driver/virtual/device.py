@@ -7,21 +7,21 @@ the very bytes that an SDO upload of its objects would give.
 from __future__ import annotations
 
 import contextlib
+import struct
 from collections.abc import Callable
 from typing import Any
 
 import can
 import canopen
-from canopen.objectdictionary import INTEGER_TYPES, SIGNED_TYPES, ODVariable
 
 from hydraulic_can_driver.bus import Node
+from hydraulic_can_driver.virtual.objects import Objects
 from hydraulic_can_driver.virtual.pdo import check_write
 from hydraulic_can_driver.virtual.plant import Reading
 from hydraulic_can_driver.virtual.process_data import ProcessData, Upsets
 from hydraulic_can_driver.virtual.wiring import Event, Wiring
 
 RESET_NODE, RESET_COMMUNICATION = 129, 130
-VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x06090031, 0x06090032
 _HISTORY = 8
 
 
@@ -57,8 +57,7 @@ class Device:
         self.node: canopen.LocalNode | None = None
         self.stored: dict[tuple[int, int], int] = {}  # settings that survive a loss of power
         self.pdos = ProcessData(self, wiring.network, wiring.lock, lambda number: self._say("rpdo", str(number)))
-        self._dictionary = canopen.import_od(str(wiring.eds(spec)), spec.id)
-        self._image: dict[tuple[int, int], float] = {}
+        self.objects = Objects(canopen.import_od(str(wiring.eds(spec)), spec.id))
         self._connected = False
 
     @property
@@ -75,10 +74,10 @@ class Device:
         """Boot: stored settings, boot-up message, PRE-OPERATIONAL."""
         if self.node is not None:
             return
-        self._image.clear()
-        self.node = _Served(self, self.spec.id, self._dictionary)
+        self.objects.clear()
+        self.node = _Served(self, self.spec.id, self.objects.dictionary)
         for (index, sub), value in self.stored.items():
-            self.take_bytes(index, sub, self._object(index, sub).encode_raw(value))
+            self.take_bytes(index, sub, self.objects.variable(index, sub).encode_raw(value))
         self.start()
         self.connect()
         self._say("power", "on")
@@ -101,7 +100,7 @@ class Device:
         # The bench hands NMT commands on, so that a device may vanish while one is being obeyed.
         self.wiring.network.unsubscribe(0, self.node.nmt.on_command)
         self._connected = True
-        self.pdos.configure(list(self._dictionary))
+        self.pdos.configure(list(self.objects.dictionary))
         self._beat()
 
     def disconnect(self) -> None:
@@ -173,12 +172,11 @@ class Device:
 
     def get(self, index: int, sub: int = 0) -> Any:
         """Number in an object, as an SDO upload would give it."""
-        return self._object(index, sub).decode_raw(self.object_bytes(index, sub))
+        return self.objects.number(index, sub, self._stored)
 
     def object_bytes(self, index: int, sub: int) -> bytes:
         """Bytes of an object."""
-        assert self.node is not None, f"{self.name} has no power"
-        return self.node.get_data(index, sub)
+        return self.objects.type(index, sub).encode(self.get(index, sub))
 
     def take_bytes(self, index: int, sub: int, data: bytes) -> None:
         """Put bytes into an object from inside: nothing is refused."""
@@ -187,14 +185,24 @@ class Device:
 
     def set(self, index: int, sub: int, value: float) -> None:
         """Let an object read ``value`` from now on; cut to the range of its type."""
-        self._image[index, sub] = value
+        self.objects.put(index, sub, value)
 
     def store(self, index: int, sub: int, value: int) -> None:
-        """Set a parameter as with the maker's tool: it holds now and after every power-on."""
+        """Set a parameter as with the maker's tool: it holds now and after every power-on.
+
+        :raises ValueError: there is no such object, or the value does not fit.
+        """
+        found = self.objects.find(index, sub)
+        if found is None:
+            raise ValueError(f"{self.name} has no object 0x{index:04X}:{sub}")
+        try:
+            data = found.encode_raw(value)
+        except (struct.error, canopen.ObjectDictionaryError) as error:
+            raise ValueError(f"{self.name}, 0x{index:04X}:{sub} cannot be {value}: {error}") from None
         with self.wiring.lock:
             self.stored[index, sub] = value
             if self.node is not None:
-                self.take_bytes(index, sub, self._object(index, sub).encode_raw(value))
+                self.take_bytes(index, sub, data)
 
     def read(self, index: int, sub: int, by_sdo: bool, stored: Callable[[], bytes]) -> bytes:
         """Bytes of an object: what the device measures where it measures it, else what is ``stored``."""
@@ -202,14 +210,8 @@ class Device:
             if by_sdo:
                 self._asked("sdo read", index, sub)
             identity = self.upsets.identity.get(sub) if index == 0x1018 else None
-            value = self._image.get((index, sub)) if identity is None else identity
-            if value is None:
-                return stored()
-            od = self._object(index, sub)
-            if od.data_type in INTEGER_TYPES:
-                low = -(1 << len(od) - 1) if od.data_type in SIGNED_TYPES else 0
-                value = min(max(int(value), low), low + (1 << len(od)) - 1)
-            return bytes(od.encode_raw(value))
+            value = self.objects.own(index, sub) if identity is None else identity
+            return stored() if value is None else bytes(self.objects.type(index, sub).encode(value))
 
     def write(self, index: int, sub: int, data: bytes, by_sdo: bool, store: Callable[[], None]) -> None:
         """Take the bytes of an object, or answer with an SDO abort."""
@@ -217,9 +219,9 @@ class Device:
             if by_sdo:
                 self._check(index, sub, data)
             store()
-            self._image.pop((index, sub), None)
+            self.objects.written(index, sub)
             if 0x1400 <= index < 0x1C00 and self._connected:
-                self.pdos.configure(list(self._dictionary))
+                self.pdos.configure(list(self.objects.dictionary))
             elif index == 0x1017:
                 self._beat()
             self.written(index, sub)
@@ -281,32 +283,17 @@ class Device:
     def _check(self, index: int, sub: int, data: bytes) -> None:
         if (index, sub) in self.upsets.aborts:
             raise canopen.SdoAbortedError(self.upsets.aborts[index, sub])
-        od = self._find(index, sub)
-        if od is None or od.data_type not in INTEGER_TYPES or 8 * len(data) != len(od) or not od.writable:
-            return  # the dictionary itself has the answer to that
-        value: Any = od.decode_raw(data)
-        if od.max is not None and value > od.max:
-            raise canopen.SdoAbortedError(VALUE_TOO_HIGH)
-        if od.min is not None and value < od.min:
-            raise canopen.SdoAbortedError(VALUE_TOO_LOW)
-        check_write(self.get, self._mappable, index, sub, value)
+        value = self.objects.value_to_write(index, sub, data)
+        if value is None:
+            return
+        check_write(self.get, self.objects.mappable, index, sub, value)
         code = self.refuse(index, sub, value)
         if code:
             raise canopen.SdoAbortedError(code)
 
+    def _stored(self, index: int, sub: int) -> bytes:
+        assert self.node is not None, f"{self.name} has no power"
+        return self.node.get_data(index, sub)
+
     def _say(self, kind: str, detail: str) -> None:
         self.wiring.tell(Event(kind, self.name, detail))
-
-    def _object(self, index: int, sub: int) -> ODVariable:
-        found = self._dictionary[index]
-        return found if isinstance(found, ODVariable) else found[sub]
-
-    def _find(self, index: int, sub: int) -> ODVariable | None:
-        try:
-            return self._object(index, sub)
-        except KeyError:
-            return None
-
-    def _mappable(self, index: int, sub: int) -> int:
-        found = self._find(index, sub)
-        return len(found) if found is not None and found.pdo_mappable else 0

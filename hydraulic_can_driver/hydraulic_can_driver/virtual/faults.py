@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import can
 
@@ -27,9 +27,10 @@ _VALVE_CABLE, _VALVE_REGISTER = 0x5001, 0x80
 
 @dataclass(frozen=True)
 class Fault(ABC):
-    """Something wrong with the device ``node``."""
+    """Something wrong with the device ``node``; ``profiles`` that can have it, all if empty."""
 
     node: str
+    profiles: ClassVar[tuple[int, ...]] = ()
 
     @abstractmethod
     def begin(self, bench: VirtualBench) -> None:
@@ -68,6 +69,7 @@ class Emergency(Fault):
 class StatusFault(Fault):
     """The valve finds something wrong with itself; it can be reset once the fault has ended."""
 
+    profiles = (408,)
     code: int = _LOW_SUPPLY
     register: int = _LOW_SUPPLY_REGISTER
 
@@ -121,6 +123,7 @@ class PdoLength(Fault):
 class PositionJump(Fault):
     """The LVDT reads ``by`` [m] too much."""
 
+    profiles = (406,)
     by: float = 0.05
 
     def begin(self, bench: VirtualBench) -> None:
@@ -134,6 +137,8 @@ class PositionJump(Fault):
 class PositionFrozen(Fault):
     """The LVDT repeats its last position."""
 
+    profiles = (406,)
+
     def begin(self, bench: VirtualBench) -> None:
         _lvdt(bench, self.node).frozen = True
 
@@ -145,6 +150,7 @@ class PositionFrozen(Fault):
 class PositionStuck(Fault):
     """The LVDT reads the position ``at`` [m]; by default one outside of any stroke."""
 
+    profiles = (406,)
     at: float = 5.0
 
     def begin(self, bench: VirtualBench) -> None:
@@ -158,6 +164,7 @@ class PositionStuck(Fault):
 class LimitSwitch(Fault):
     """A limit switch of the LVDT closes where the piston is: ``side`` is "extended" or "retracted"."""
 
+    profiles = (406,)
     side: str = "extended"
 
     def begin(self, bench: VirtualBench) -> None:

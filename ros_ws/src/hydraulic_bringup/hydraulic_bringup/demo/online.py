@@ -13,6 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Protocol
 
+from hydraulic_bringup.verbs.virtual_bench import READY
 from hydraulic_interfaces.contract import ABORTED
 from hydraulic_sysid.excitation import load_plan
 
@@ -26,10 +27,11 @@ SENSORS = {
     "pressure_noise": 15e3,
     "noise_seed": 1,
 }
+BUS = "bench"
 # Nothing can break here, and a laptop that holds a process up for longer than the bench's 50 ms should not end a demo.
 WATCHDOG_S = 0.2
-# A simulated actuator may be excited again after an abort; whether a real one may is for its user to say.
-ATTEMPTS = {"sim": 2, "can": 1}
+# A simulated actuator may be excited again after an abort, also behind virtual CAN devices.
+ATTEMPTS = 2
 _START_S = 90.0  # the first start on a machine compiles the physics
 _STEP_S = 20.0
 _LAST_WORDS_S = 3.0
@@ -65,8 +67,7 @@ def run(plant: str, model: Path, experiments: Sequence[Experiment], out: Path, s
         client_class = import_module("hydraulic_bringup.nodes._graph_client").GraphClient
         with client_class() as client:
             simulator = _start_plant(crew, client, plant, module, model, steps)
-            attempts = ATTEMPTS[plant]
-            bags = [_experiment(crew, client, experiment, out, steps, attempts) for experiment in experiments]
+            bags = [_experiment(crew, client, experiment, out, steps, ATTEMPTS) for experiment in experiments]
             steps.begin("stop the plant", 1.0)
             simulator.stop()
             steps.done()
@@ -101,8 +102,12 @@ def _free_domain() -> Iterator[int]:
 
 
 def _start_plant(crew: Crew, client, plant: str, module: str, model: Path, steps: Steps) -> Child:
+    values: dict[str, object] = {"watchdog": WATCHDOG_S}
+    if plant == "can":
+        values |= _start_devices(crew, model, steps)
+    else:
+        values |= {"model": str(model), **SENSORS}
     steps.begin("start the plant", 3.0)
-    values = {"model": str(model), "watchdog": WATCHDOG_S, **SENSORS} if plant == "sim" else {}
     settings = [part for name, value in values.items() for part in ("-p", f"{name}:={value}")]
     child = crew.start("plant", module, "--ros-args", *settings)
 
@@ -120,6 +125,22 @@ def _start_plant(crew: Crew, client, plant: str, module: str, model: Path, steps
         raise DemoError("start the plant", f"it was not enabled: {problem}", f"log: {child.log}")
     steps.done()
     return child
+
+
+def _start_devices(crew: Crew, model: Path, steps: Steps) -> dict[str, object]:
+    """Start virtual CAN devices over the model, on a channel of their own; what the driver has to be told of them."""
+    step = "start the virtual CAN devices"
+    steps.begin(step, 3.0)
+    draw = random.SystemRandom().randint
+    channel = f"239.74.{draw(0, 255)}.{draw(1, 254)}:{draw(20000, 30000)}"
+    line = ("--interface", "udp_multicast", "--channel", channel)
+    noise = ("--position-noise", str(SENSORS["position_noise"]), "--pressure-noise", str(SENSORS["pressure_noise"]))
+    child = crew.start(
+        "devices", "hydraulic_bringup.verbs.virtual_bench", "--bus", str(BUS), *line, "--model", str(model), *noise
+    )
+    crew.wait(lambda: READY in child.log.read_text(errors="replace"), step, _START_S, steps.tick)
+    steps.done()
+    return {"bus": str(BUS), "interface": line[1], "channel": channel}
 
 
 def _experiment(crew: Crew, client, experiment: Experiment, out: Path, steps: Steps, attempts: int) -> Path:
