@@ -72,8 +72,16 @@ class Bench:
                 values[key] = 1.0 + size if key == "sensor_scale" else size
         return values
 
-    def values(self) -> dict[str, float]:
-        return self.plain() | self.extra()
+    def values(self, without: tuple[str, ...] = ()) -> dict[str, float]:
+        """The plant's parameters; ``without`` names hidden effects that are left out."""
+        values = self.plain()
+        extra = self.extra()
+        for h in self.hidden:
+            if h.name not in without:
+                values |= {key: extra[key] for key in h.values}
+        if values["bristle"] == parameters.PLAIN["bristle"]:  # the bristles keep their stiffness under any friction
+            values["bristle"] *= values["coulomb"] / parameters.PLAIN["coulomb"]
+        return values
 
     def known(self) -> list[str]:
         """Effects in the user's model file."""
@@ -98,7 +106,7 @@ class Bench:
             "what": [h.what for h in self.hidden if h.what],
             "known": self.known(),
             "as_built": self.plain(),
-            "plant": self.extra(),
+            "plant": self.values(),
         }
 
 
@@ -110,11 +118,7 @@ def make(
     ``without`` names hidden effects to leave out (the same bench, noise and drive otherwise); another ``draw`` is
     the same bench measured once more, with other noise and other random drives; ``names``: these experiments only.
     """
-    values = bench.plain()
-    extra = bench.extra()
-    for h in bench.hidden:
-        if h.name not in without:
-            values |= {key: extra[key] for key in h.values}
+    values = bench.values(without)
     records = {}
     for name in names or experiments.NAMES:
         feed = experiments.drive(name, bench.rng(name + draw))

@@ -23,8 +23,8 @@ PLAIN: dict[str, float] = {
     "viscous": 164.0,
     "leakage": 5e-13,
     "coulomb": 450.0,  # not on the data sheet
-    "bristle": 6e-6,  # sliding distance over which the bristles bend, m
-    "bristle_time": 1.5e-3,  # their damping over their stiffness, s
+    "bristle": 2.25e-5,  # sliding distance over which the bristles bend, m: 450 N over 2e7 N/m
+    "bristle_time": 1e-4,  # their damping over their stiffness, s
     "stop_stiffness": 6.14e8,
     "stop_damping": 200.0,
 }

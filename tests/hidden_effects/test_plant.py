@@ -48,7 +48,7 @@ def test_shut_in_oil_conserves_mass():
 def test_coulomb_friction_takes_four_times_its_force_over_stiffness_per_cycle():
     level = 300.0
     start = (0.0, 0.0, MIDDLE + 1e6, MIDDLE - 1e6)
-    _, seen = plant.run(SHUT | {"coulomb": level}, still(0.3), centring=0.0, start=start)
+    _, seen = plant.run(SHUT | {"coulomb": level, "bristle": 1e-6}, still(0.3), centring=0.0, start=start)
     x = seen["position"]
     peaks = x[1:-1][(x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])]
     assert len(peaks) >= 5
