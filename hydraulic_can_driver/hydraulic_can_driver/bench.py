@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from hydraulic_can_driver.bus import Bus
+from hydraulic_can_driver.bus import Bus, Node
 from hydraulic_can_driver.cia408 import CONTROL_WORDS, State, StateMachine, describe, state_of
 from hydraulic_can_driver.codec import PdoCodec
 from hydraulic_can_driver.errors import BusDownError, CanDriverError, DeviceError
@@ -84,11 +84,12 @@ class Bench:
 
         :raises DeviceError: it does not come to that; the text says why.
         """
-        self._no_errors()
+        self._no_errors(self._sensors())
         self.master.watch_master(self.bus.valve, True)
         self.faults.clear()
         self.machine = StateMachine(self.bus.monitoring.state_change)
         self.measuring.forget()
+        self.frames.forget()
         self._looping, self.operational = False, True
         self.beat.start()
         for node in self.bus.nodes.values():
@@ -105,10 +106,12 @@ class Bench:
         :raises DeviceError: it does not follow.
         """
         with self._changed:
+            if self.problem and goal is not State.DISABLED:
+                raise DeviceError(self.problem)
             self.machine.ask(goal, time.monotonic())
             if self._looping and not self._wait(lambda: self.machine.arrived or bool(self.machine.problem)):
                 raise DeviceError(f"{self._reason()}; expected {goal.name}")
-            if self.machine.problem:
+            if self.machine.problem and goal is not State.DISABLED:
                 raise DeviceError(self.machine.problem)
 
     def cycle(self, stamp_ns: int, drive: float) -> PlantSample | None:
@@ -135,7 +138,9 @@ class Bench:
             raise DeviceError(f"{self.faults.text}: deactivate, clean up and configure anew")
         if silent := self.supervision.silent(time.monotonic()):
             raise DeviceError(f"no heartbeat: {', '.join(silent)}")
-        self._no_errors()
+        if late := self.frames.debtors():
+            raise DeviceError(f"frames come late: {', '.join(late)}; deactivate and activate where that stays so")
+        self._no_errors(self._sensors())
         with self._changed:
             self.faults.clear()
             self.measuring.forget()
@@ -143,6 +148,7 @@ class Bench:
             self.machine.reset(time.monotonic())
             if not self._wait(lambda: self.machine.arrived or bool(self.faults.text)) or self.faults.text:
                 raise DeviceError(self.faults.text or self._reason())
+        self._no_errors([self.bus.valve])
 
     def stop(self) -> None:
         """0 V and disabled, seen in the status word; then nobody operational any more. May be called again.
@@ -240,10 +246,13 @@ class Bench:
     def _wait(self, done: Callable[[], bool]) -> bool:
         return self._changed.wait_for(done, 4.0 * self.bus.monitoring.state_change + 1.0)
 
-    def _no_errors(self) -> None:
-        for node in self.bus.nodes.values():
-            # The valve tells its faults in the status word, and is reset by the control word.
-            if node is not self.bus.valve and (register := self.master.error_register(node)):
+    def _sensors(self) -> list[Node]:
+        """All but the valve, which tells its faults in the status word and is reset by the control word."""
+        return [node for node in self.bus.nodes.values() if node is not self.bus.valve]
+
+    def _no_errors(self, nodes: list[Node]) -> None:
+        for node in nodes:
+            if register := self.master.error_register(node):
                 raise DeviceError(f"{node.name} reports an error: error register 0x{register:02X}")
 
     def _quieten(self) -> None:

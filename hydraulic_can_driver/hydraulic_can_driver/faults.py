@@ -58,6 +58,12 @@ class FaultLatch:
         with self._lock:
             return "; ".join(self._latched.values())
 
+    @property
+    def latched(self) -> set[Fault]:
+        """All kinds that are latched."""
+        with self._lock:
+            return set(self._latched)
+
     def __contains__(self, fault: Fault) -> bool:
         return fault in self._latched
 

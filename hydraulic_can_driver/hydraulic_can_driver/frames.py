@@ -1,6 +1,10 @@
 """The frames that answer one SYNC: complete or not, of the right length, in time.
 
 `begin`, `wait` and `end` are called around a cycle; `take` by the thread that receives, for every frame as it comes.
+
+A frame does not say which SYNC it answers. One that comes while none is missing makes up for one that was missing
+before. A device that misses several cycles in a row and does not make up for them is taken to be late: each of its
+frames may be one of an earlier SYNC.
 """
 
 from __future__ import annotations
@@ -14,9 +18,14 @@ from hydraulic_can_driver.codec import PdoCodec
 from hydraulic_can_driver.errors import CodecError
 from hydraulic_can_driver.faults import Fault, FaultLatch
 
+_LOST = 2  # so many frames in a row may be lost for good
+
 
 class Frames:
-    """Frames of all devices by COB-ID."""
+    """Frames of all devices by COB-ID; `owed[cob_id]` are those that a device has not made up for.
+
+    `behind` counts the complete cycles since a device has owed more than may be lost.
+    """
 
     def __init__(self, bus: Bus, faults: FaultLatch) -> None:
         self._codecs = {pdo.cob_id: PdoCodec(pdo) for node in bus.nodes.values() for pdo in node.transmit}
@@ -29,6 +38,9 @@ class Frames:
         self.cycle = 0
         self.sync_ns = 0
         self.late = 0
+        self.owed: dict[int, int] = {}
+        self.behind = 0
+        self._run: dict[int, tuple[int, int]] = {}  # cycles missed in a row, owed before them
 
     @property
     def cob_ids(self) -> Iterable[int]:
@@ -48,6 +60,20 @@ class Frames:
         """What comes from here to the next SYNC is late."""
         with self._changed:
             self._open = False
+            for cob_id in self._codecs:
+                owed = self.owed.get(cob_id, 0)
+                run, before = self._run.get(cob_id, (0, owed))
+                if cob_id in self._missing:
+                    self._run[cob_id] = run + 1, before
+                    self.owed[cob_id] = owed + 1
+                else:
+                    self._run.pop(cob_id, None)
+                    if run <= _LOST and owed > before:
+                        self._pay(cob_id, owed - before)
+            if max(self.owed.values(), default=0) <= _LOST:
+                self.behind = 0
+            elif not self._missing:
+                self.behind += 1
 
     def take(self, cob_id: int, data: bytes) -> None:
         """A frame has come."""
@@ -62,10 +88,26 @@ class Frames:
             # A second one within a cycle means that the first belonged to the cycle before.
             if not self._open or cob_id not in self._missing:
                 self.late += 1
+                self._pay(cob_id, 1)
             self._raw[cob_id] = data
             self._missing.discard(cob_id)
             if not self._missing:
                 self._changed.notify_all()
+
+    def forget(self) -> None:
+        """Nobody owes anything."""
+        with self._changed:
+            self.owed, self._run, self.behind = {}, {}, 0
+
+    def debtors(self) -> list[str]:
+        """Devices whose frames may be those of earlier SYNCs, with the number of cycles."""
+        with self._changed:
+            return [f"{self._nodes[cob_id].name} by {count} cycles" for cob_id, count in self.owed.items()]
+
+    def _pay(self, cob_id: int, count: int) -> None:
+        left = self.owed.pop(cob_id, 0) - count
+        if left > 0:
+            self.owed[cob_id] = left
 
     def wait_sync(self, cycle: int, until: float) -> bool:
         """Wait until a SYNC beyond number `cycle` has begun, at the longest until `until` of `time.monotonic`."""
