@@ -137,10 +137,10 @@ def _try(plan: Plan, plant: Plant, limits: Limits, factor: float) -> tuple[Sized
     except SimulationError:
         return None, _TOO_MUCH, "the model, which no step follows there,"
     parts = limits.used(rehearsal, plan.centre)
-    if rehearsal.aborted and max(parts.values()) <= 1.0:
-        return None, _TOO_MUCH, rehearsal.aborted
     why = max(parts, key=lambda name: parts[name])
-    return Sized(bounded, rehearsal), parts[why], why
+    # What was broken off has not shown how far it would have gone.
+    part = max(parts[why], _TOO_MUCH) if rehearsal.aborted else parts[why]
+    return Sized(bounded, rehearsal), part, why
 
 
 def _peak(plan: Plan) -> float:

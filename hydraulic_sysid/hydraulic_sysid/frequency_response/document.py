@@ -129,8 +129,8 @@ def _level(lines: Lines | None, found: BestLinearApproximation, weigh: Callable[
     are no such lines, or no more than noise on them."""
     if lines is None:
         return None
-    beside = np.interp(lines.frequency, found.frequency, found.output)
-    return _ratio(lines.amplitude**2 - lines.noise**2, beside**2, weigh(lines.frequency))
+    beside = np.interp(lines.frequency, found.frequency, found.output**2)
+    return _ratio(lines.amplitude**2 - lines.noise**2, beside, weigh(lines.frequency))
 
 
 def _between(found: BestLinearApproximation, weight: Array) -> float | None:
@@ -148,15 +148,16 @@ def _ratio(power: Array, reference: Array, weight: Array) -> float | None:
 def _linear_share(found: BestLinearApproximation, levels: dict[str, float | None]) -> float | None:
     """Best fit [%] that a linear model can reach on the played lines and those beside them: what of the output's
     amplitude is neither distortion nor noise. None where distortion was not told."""
+    played = float(np.sum(found.output**2))
     if found.odd is not None and found.even is not None:
-        # In the band as many lines carry distortion as there are lines, each as much as the detection lines show.
-        beside = [np.interp(found.frequency, x.frequency, x.amplitude) for x in (found.odd, found.even)]
-        wrong = float(np.sum(beside[0] ** 2 + beside[1] ** 2 + found.output_noise**2))
-    elif found.distortion is not None:
-        wrong = float(np.sum((found.distortion / np.abs(found.response) * found.output) ** 2 + found.output_noise**2))
-    else:
+        # On the lines that are played lies as much odd distortion as on the odd lines beside them.
+        beside = float(np.sum(found.odd.amplitude**2) + np.sum(found.even.amplitude**2))
+        wrong = float(np.sum(np.interp(found.frequency, found.odd.frequency, found.odd.amplitude**2))) + beside
+        return 100.0 * (1.0 - float(np.sqrt(wrong / (played + beside))))
+    if found.distortion is None:
         return None
-    return 100.0 * (1.0 - float(np.sqrt(wrong / np.sum(found.output**2))))
+    wrong = float(np.sum((found.distortion / np.abs(found.response) * found.output) ** 2 + found.output_noise**2))
+    return 100.0 * (1.0 - float(np.sqrt(wrong / played)))
 
 
 def _spectral(record: Record, settings: Settings) -> dict[str, Any]:
