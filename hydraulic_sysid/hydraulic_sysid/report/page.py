@@ -19,6 +19,7 @@ from . import (
     frequency_response_section,
     identify_section,
     paper_section,
+    validate_section,
 )
 from .html import Figures, tag, text
 
@@ -33,6 +34,7 @@ SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
     "hydraulic_sysid.frequency_response/1": frequency_response_section.html,
     "hydraulic_sysid.identify/2": identify_section.html,
     "hydraulic_sysid.paper/1": paper_section.html,
+    "hydraulic_sysid.validate/1": validate_section.html,
 }
 
 
