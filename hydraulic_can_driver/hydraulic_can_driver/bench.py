@@ -53,7 +53,9 @@ class Bench:
         self.operational = False
         self._period = 1.0 / bus.rate
         self._codec = PdoCodec(bus.drive_pdo)
-        self._status = next(s.address for _, _, s in bus.signals() if s.name == "status_word")
+        self._status_pdo, self._status = next(
+            (pdo, signal.address) for _, pdo, signal in bus.signals() if signal.name == "status_word"
+        )
         self._valve_state: State | None = None
         self._changed = threading.Condition()
         self._looping = False
@@ -121,6 +123,7 @@ class Bench:
         complete, frame = self._exchange(drive)
         self.supervision.cycle(stamp_ns, complete)
         with self._changed:
+            self._hear_valve()
             sample = self._take(stamp_ns, frame) if complete else None
             if self.machine.problem and not self.faults.text:
                 self.faults.report(Fault.VALVE, self.machine.problem)
@@ -207,9 +210,13 @@ class Bench:
         self.frames.end()
         return complete and in_time, frame
 
+    def _hear_valve(self) -> None:
+        """The valve's word counts also where another device is silent."""
+        if self.frames.has(self._status_pdo.cob_id):
+            self.machine.advance(int(self.frames.quantities()["status_word"]), time.monotonic())
+
     def _take(self, stamp_ns: int, frame: bytes) -> PlantSample:
         found = self.frames.quantities()
-        self.machine.advance(int(found["status_word"]), time.monotonic())
         for fault, text in self.measuring.problems(stamp_ns, found):
             self.faults.report(fault, text)
         return self.measuring.sample(stamp_ns, self._codec.decode(frame)["drive"], found)
@@ -220,8 +227,9 @@ class Bench:
         end += patience
         while not done() and due < end:
             complete, frame = self._exchange(0.0)
-            if complete:
-                with self._changed:
+            with self._changed:
+                self._hear_valve()
+                if complete:
                     self._take(self.frames.sync_ns, frame)
             due = max(due + self._period, time.monotonic() - self._period)
             time.sleep(max(due - time.monotonic(), 0.0))
@@ -231,7 +239,8 @@ class Bench:
             self.machine.ask(State.DISABLED, time.monotonic())
         states = self.receiver.states
         operational = all(states.get(node.name) == OPERATIONAL for node in self.bus.nodes.values() if node.heartbeat)
-        return operational and self.machine.arrived and self.machine.goal is State.DISABLED
+        answered = operational and not self.frames.lacking()
+        return answered and self.machine.arrived and self.machine.goal is State.DISABLED
 
     def _reason(self) -> str:
         silent = [node.name for node in self.bus.nodes.values() if self.receiver.states.get(node.name) != OPERATIONAL]

@@ -119,6 +119,11 @@ class Frames:
         with self._changed:
             return self._changed.wait_for(lambda: not self._missing, max(until - time.monotonic(), 0.0))
 
+    def has(self, cob_id: int) -> bool:
+        """Whether a frame has come in this cycle."""
+        with self._changed:
+            return self.cycle > 0 and cob_id not in self._missing
+
     def lacking(self) -> list[str]:
         """Names of the devices whose frames are missing in this cycle."""
         with self._changed:

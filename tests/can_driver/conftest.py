@@ -134,6 +134,7 @@ def fill(wire: Wire) -> None:
         wire.objects[(0x10, index, sub)] = bytes(size)
     full = struct.pack("<h", 16384)
     wire.objects |= {(0x10, 0x6322, 1): full, (0x10, 0x6341, 1): full, (0x10, 0x6320, 1): full}
+    wire.objects[(0x10, 0x6041, 0)] = b"\x08\0"
     wire.objects[(0x10, 0x6321, 1)] = struct.pack("<h", -16384)
     for index, sub, size in ((0x6005, 1, 4), (0x6401, 1, 4), (0x6402, 1, 4), (0x6503, 0, 2), (0x6505, 0, 2)):
         wire.objects[(0x20, index, sub)] = bytes(size)
@@ -271,6 +272,8 @@ class Loop(threading.Thread):
         self.bench, self.drive, self.ending = bench, 0.0, False
         self.samples: list[Any] = []
         self.first = threading.Event()
+        self.hold = threading.Event()
+        self.hold.set()
 
     def run(self) -> None:
         period = 1.0 / self.bench.bus.rate
@@ -279,6 +282,7 @@ class Loop(threading.Thread):
             if sample is not None:
                 self.samples.append(sample)
             self.first.set()
+            self.hold.wait()
             time.sleep(period)
 
     def end(self) -> None:
