@@ -12,6 +12,8 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from rich.console import Console
+
 from hydraulic_control.errors import HydraulicControlError
 from hydraulic_sim.errors import HydraulicSimError
 
@@ -31,6 +33,14 @@ def parser(verb: str, description: str, epilog: str) -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
+
+
+def console() -> Console:
+    """Standard output for tables, wide enough for them where it is no terminal."""
+    found = Console(file=sys.stdout, highlight=False, markup=False, soft_wrap=False)
+    if not found.is_terminal:
+        found.width = 120
+    return found
 
 
 def positive(text: str) -> float:

@@ -37,6 +37,11 @@ class Controller:
         return float(self._state["drive"][0])
 
     @property
+    def records(self) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters and state as the compiled step takes them, for loops that are compiled as a whole."""
+        return self._record, self._state
+
+    @property
     def running(self) -> bool:
         """Whether it has begun; before, and after `stop`, the next step starts afresh."""
         return bool(self._state["running"][0])

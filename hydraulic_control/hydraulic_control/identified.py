@@ -10,17 +10,20 @@ from __future__ import annotations
 import json
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hydraulic_control.compiled_loop import linear
+from hydraulic_control.controller import Controller
 from hydraulic_control.errors import HydraulicControlError
 
 NAN = float("nan")
 _APART = 1e-9
+_COMMON_NAMES = ("identify", "linear_model")  # all results are called so: their folder tells them apart
 
 
 @dataclass(frozen=True)
@@ -51,10 +54,6 @@ class IdentifiedModel:
         slowest = int(np.argmin(np.abs(self.poles)))
         return float(self.residues[slowest].real)
 
-    def named(self, name: str) -> IdentifiedModel:
-        """The same under another name."""
-        return replace(self, name=name)
-
     def plant(self) -> IdentifiedPlant:
         """A plant at rest at 0 m."""
         return IdentifiedPlant(self)
@@ -81,6 +80,17 @@ class IdentifiedPlant:
         self._states = self._turn * self._states + self._push * acting
         self.true_position = position
         return position, NAN, applied
+
+    def close_loop(self, controller: Controller, wanted: NDArray, dt: float) -> tuple[NDArray, int]:
+        """See `simulation.LoopPlant`; always from rest at 0 m, compiled."""
+        self._prepare(dt)
+        out, model = np.empty((len(wanted), 2)), self._model
+        late = round(model.delay / dt)
+        done = linear(
+            self._turn, self._push.astype(complex), model.residues, model.direct, late,
+            *controller.records, dt, wanted, out,
+        )  # fmt: skip
+        return out, int(done)
 
     def _prepare(self, dt: float) -> None:
         p = self._model.poles
@@ -120,8 +130,8 @@ def from_coefficients(
 
 def _continuous(z: NDArray, residues: NDArray, period: float, name: str) -> tuple[NDArray, NDArray]:
     """Modes r/(q − z) under a zero-order hold as modes c/(s − p): p = ln(z)/T, c = r·p/(z − 1)."""
-    # A pole at z = 0 is a pure delay of one sample, which has no logarithm: it decays within a thousandth of one.
-    z = np.where(np.abs(z) < 1e-12, np.exp(-1000.0), z)
+    # A pole at z = 0 is a pure delay of one sample, which has no logarithm: it decays within a thirtieth of one.
+    z = np.where(np.abs(z) < 1e-13, 1e-13, z)
     s = np.log(z) / period
     slow = np.abs(z - 1.0) < _APART
     gain = np.where(slow, 1.0 / period, s / np.where(slow, 1.0, z - 1.0))
@@ -131,8 +141,8 @@ def _continuous(z: NDArray, residues: NDArray, period: float, name: str) -> tupl
 
 
 def load_identified(path: Path | str) -> IdentifiedModel:
-    """Model in a result of ``hydraulic_sysid identify``, or in a JSON file with numerator, denominator,
-    sampling_time [s] (null: continuous) and, if it has one, delay [s].
+    """Model in a file that ``hydraulic_sysid identify`` writes (linear_model.json, or identify.json), or in any JSON
+    file with numerator, denominator, sampling_time [s], domain (discrete or continuous) and, if it has one, delay [s].
 
     Raises `HydraulicControlError` for a file that cannot be read or holds no transfer function from V to m.
     """
@@ -143,16 +153,22 @@ def load_identified(path: Path | str) -> IdentifiedModel:
         raise HydraulicControlError(f"{file}: cannot be read ({error.strerror})") from None
     except ValueError as error:
         raise HydraulicControlError(f"{file}: not a JSON document ({error})") from None
-    settings = document.get("settings", {}) if isinstance(document, dict) else {}
+    try:
+        _check_units(file, document)
+        form = document
+        for key in ("model", "transfer_function"):
+            form = form.get(key, form)
+        continuous = form.get("domain", "discrete") == "continuous"
+        period = None if continuous else form.get("sampling_time")
+        name = file.absolute().parent.name if file.stem in _COMMON_NAMES else file.stem
+        return from_coefficients(form["numerator"], form["denominator"], period, form.get("delay") or 0.0, name)
+    except (AttributeError, KeyError, TypeError) as error:
+        raise HydraulicControlError(f"{file}: holds no transfer function ({error})") from None
+
+
+def _check_units(file: Path, document: dict[str, Any]) -> None:
+    settings = document.get("settings", document)
     for side, unit in (("input", "V"), ("output", "m")):
-        found = settings.get(side, {}).get("unit", unit) if isinstance(settings, dict) else unit
+        found = settings.get(side, {}).get("unit", unit)
         if found != unit:
             raise HydraulicControlError(f"{file}: its {side} is in {found}; a position loop needs one in {unit}")
-    held = document.get("model", document) if isinstance(document, dict) else {}
-    form = held.get("transfer_function", held) if isinstance(held, dict) else {}
-    try:
-        return from_coefficients(
-            form["numerator"], form["denominator"], form.get("sampling_time"), form.get("delay") or 0.0, file.stem
-        )
-    except (KeyError, TypeError) as error:
-        raise HydraulicControlError(f"{file}: holds no transfer function ({error})") from None

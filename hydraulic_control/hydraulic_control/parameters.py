@@ -40,7 +40,7 @@ LAW: tuple[ParameterSpec, ...] = (
     _live("derivative_time", 2e-3, "time constant of the filter on the derivative", "s", 0.0, 1.0),
     ParameterSpec("antiwindup", "conditional_integration", f"of the integral: {', '.join(ANTIWINDUP)}", live=True),
     _live("tracking_time", 0.1, "time constant of back-calculation", "s", 1e-3, 100.0),
-    _live("integral_zone", 2e-3, "error at which integration is down to a half; 0: never", "m", 0.0, 100.0),
+    _live("integral_zone", 1e-3, "error at which integration is down to a half; 0: never", "m", 0.0, 100.0),
     _live("integral_limit", 2.0, "largest contribution of the integral", "V", 0.0, DRIVE_LIMIT_V),
     _live("drive_limit", DRIVE_LIMIT_V, "largest drive", "V", 0.0, DRIVE_LIMIT_V),
     _live("slew_limit", 2000.0, "fastest change of the drive", "V/s", 1.0, 1e6),

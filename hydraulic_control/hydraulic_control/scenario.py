@@ -29,10 +29,11 @@ BIAS = 0.005
 
 @dataclass(frozen=True)
 class Case:
-    """A plant to try gains on: a name, and what makes a fresh one at rest."""
+    """A plant to try gains on: a name, what makes a fresh one at rest, and whether it is an identified model."""
 
     name: str
     make: Callable[[], LoopPlant]
+    identified: bool = False
 
 
 def nominal(model: Model, noise: SensorNoise) -> Case:
@@ -52,7 +53,7 @@ def scattered(model: Model, count: int, seed: int, noise: SensorNoise) -> list[C
 
 def identified(models: Sequence[IdentifiedModel]) -> list[Case]:
     """The identified models."""
-    return [Case(f"identified {m.name}", m.plant) for m in models]
+    return [Case(f"identified {m.name}", m.plant, True) for m in models]
 
 
 def _maker(model: Model, noise: SensorNoise, seed: int) -> Callable[[], LoopPlant]:

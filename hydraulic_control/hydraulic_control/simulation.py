@@ -11,9 +11,10 @@ from typing import Protocol
 
 import numpy as np
 
+from hydraulic_control.compiled_loop import physical
 from hydraulic_control.controller import Controller
-from hydraulic_control.response import Response
-from hydraulic_sim.errors import SimulationError
+from hydraulic_control.response import Array, Response
+from hydraulic_sim.embedded import embedded
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 
@@ -29,6 +30,10 @@ class LoopPlant(Protocol):
 
     def step(self, drive: float, dt: float) -> tuple[float, float, float]:
         """Position [m], force from the pressures [N] and applied drive [V] now; then advance with that drive [V]."""
+
+    def close_loop(self, controller: Controller, wanted: Array, dt: float) -> tuple[Array, int]:
+        """From the present state in a loop with ``controller``: (N, 2) true position [m] and applied drive [V] for
+        ``wanted`` (N, 2), reference [m] and its velocity [m/s]; and how many samples could be followed."""
 
 
 @dataclass(frozen=True)
@@ -47,25 +52,33 @@ class SimulatedPlant:
     """A physical model behind its sensors, from rest at ``position`` [m]; the same seed gives the same noise."""
 
     def __init__(self, model: Model, noise: SensorNoise = SensorNoise(), seed: int = 0, position: float = 0.0) -> None:
-        plant = Plant(model)
-        self._live = plant.live(plant.initial_state(position=position))
-        self._noise, self._generator = noise, np.random.default_rng(seed)
-        area = float(np.hypot(plant.value("piston_area_a"), plant.value("piston_area_b")))
-        self._force_noise = noise.pressure * area
-        self._draws: list[list[float]] = []
+        self._plant = Plant(model)
+        self._start = self._plant.initial_state(position=position)
+        self._live = self._plant.live(self._start)
+        self._areas = np.array([self._plant.value("piston_area_a"), self._plant.value("piston_area_b")])
+        self._generator, self._resolution = np.random.default_rng(seed), noise.resolution
+        self._scale = np.array([noise.position, noise.pressure * float(np.hypot(*self._areas))])
         self.true_position = position
 
     def step(self, drive: float, dt: float) -> tuple[float, float, float]:
         """See `LoopPlant`. Raises `SimulationError` where the physics cannot be followed."""
         now = self._live.step(drive, dt)
-        if not self._draws:
-            self._draws = self._generator.standard_normal((1000, 2)).tolist()
-        of_position, of_force = self._draws.pop()
-        self.true_position = now.position
-        position, resolution = now.position + self._noise.position * of_position, self._noise.resolution
-        if resolution > 0.0:
-            position = round(position / resolution) * resolution
-        return position, now.force + self._force_noise * of_force, now.drive
+        of_position, of_force = self._scale * self._generator.standard_normal(2)
+        self.true_position, position = now.position, now.position + of_position
+        if self._resolution > 0.0:
+            position = round(position / self._resolution) * self._resolution
+        return position, now.force + of_force, now.drive
+
+    def close_loop(self, controller: Controller, wanted: Array, dt: float) -> tuple[Array, int]:
+        """See `LoopPlant`; always from where the plant was made, compiled."""
+        pieces = embedded(self._plant)
+        noise = self._scale * self._generator.standard_normal((len(wanted), 2))
+        out = np.full((len(wanted), 2), np.nan)
+        done = physical(
+            *pieces, self._start.states.copy(), self._start.memory.copy(), self._areas, self._resolution,
+            *controller.records, dt, wanted, noise, out,
+        )  # fmt: skip
+        return out, int(done)
 
 
 def run(
@@ -76,21 +89,12 @@ def run(
     The controller sees the sensors, the response holds the true position: figures are not to be those of the noise.
     A plant that cannot be followed any more ends the loop there: what is missing of the response is not a number.
     """
-    count = round(duration / dt)
-    columns = np.full((4, count), np.nan)
-    time, wanted, position, applied = columns
+    time = dt * np.arange(round(duration / dt), dtype=float)
+    wanted = np.array([reference(t) for t in time.tolist()]).reshape(-1, 2)
     controller.stop()
-    drive = 0.0
-    for i in range(count):
-        t = i * dt
-        r, velocity = reference(t)
-        try:
-            x, force, u = plant.step(drive, dt)
-        except SimulationError:
-            break
-        drive = controller.step(dt, r, velocity, x, force)
-        time[i], wanted[i], position[i], applied[i] = t, r, plant.true_position, u
-    return Response(time, wanted, position, applied)
+    out, done = plant.close_loop(controller, wanted, dt)
+    out[done:] = np.nan
+    return Response(time, wanted[:, 0].copy(), out[:, 0].copy(), out[:, 1].copy())
 
 
 def step_reference(amplitude: float, start: float = 0.0, at: float = 0.1) -> Reference:

@@ -38,16 +38,18 @@ class Criteria:
 
     The cost of a step is the mean of its figures over their goals, a tenth of what lies within the goal and all beyond
     it: first all goals are met, then each is bettered. ``ise`` is the goal of the integral of the squared error, over
-    the square of the step [s]. The cost of gains is half the mean and half the worst over the plants, so that no plant
-    is given up.
+    the square of the step [s]. ``agreement`` is how far rise and settling time of an identified model may lie from the
+    plant's, and its overshoot in terms of the goal: gains that rely on what the model does not know are avoided. The
+    cost of gains is half the mean and half the worst over the plants, so that no plant is given up.
     """
 
     rise: float = 0.2
     settling: float = 0.5
     overshoot: float = 1.0
-    steady_state: float = 5e-5
+    steady_state: float = 1e-5
     activity: float = 200.0
     ise: float = 0.15
+    agreement: float = 0.1
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -56,14 +58,25 @@ class Criteria:
 
     def cost(self, figures: StepFigures, step: float) -> float:
         """Of one step of ``step`` [m]; a tenth where the goals are just met, never more than `_HOPELESS` a figure."""
-        ratios = [
+        return self._mean([
             figures.rise_time / self.rise,
             figures.settling_time / self.settling,
             figures.overshoot / self.overshoot,
             figures.steady_state_error / self.steady_state,
             figures.activity / self.activity,
             figures.ise / (step**2 * self.ise),
-        ]
+        ])  # fmt: skip
+
+    def disagreement(self, figures: StepFigures, plant: StepFigures) -> float:
+        """Cost of what an identified model says otherwise than the plant."""
+        return self._mean([
+            abs(figures.rise_time / plant.rise_time - 1.0) / self.agreement,
+            abs(figures.settling_time / plant.settling_time - 1.0) / self.agreement,
+            abs(figures.overshoot - plant.overshoot) / (self.agreement * self.overshoot),
+        ])  # fmt: skip
+
+    @staticmethod
+    def _mean(ratios: Sequence[float]) -> float:
         parts = [_WITHIN * x + (1.0 - _WITHIN) * max(x - 1.0, 0.0) if math.isfinite(x) else _HOPELESS for x in ratios]
         return float(np.mean(np.minimum(parts, _HOPELESS)))
 
@@ -92,12 +105,18 @@ def figures_of(response: Response) -> StepFigures | None:
 def cost_of(
     values: Mapping[str, Any], cases: Sequence[Case], steps: Sequence[float], criteria: Criteria, duration: float
 ) -> float:
-    """Cost of these values over all plants and steps [m]."""
+    """Cost of these values over all plants, of which the first is the model as it is, and steps [m]."""
     costs = []
-    for case in cases:
-        for step in steps:
+    for step in steps:
+        plant: StepFigures | None = None
+        for i, case in enumerate(cases):
             figures = figures_of(try_step(values, case, step, duration))
-            costs.append(_HOPELESS if figures is None else criteria.cost(figures, step))
+            cost = _HOPELESS if figures is None else criteria.cost(figures, step)
+            if i == 0:
+                plant = figures
+            elif case.identified and figures is not None and plant is not None:
+                cost += criteria.disagreement(figures, plant)
+            costs.append(cost)
     return 0.5 * float(np.mean(costs)) + 0.5 * max(costs)
 
 

@@ -28,7 +28,7 @@ from hydraulic_sim.model_file import load_model
 EPILOG = """\
 examples:
   python -m hydraulic_control evaluate --gains npid pid --scatter 24
-  python -m hydraulic_control evaluate --gains npid --identified runs/chirp/identify.json runs/multisine/identify.json
+  python -m hydraulic_control evaluate --gains npid --identified runs/chirp/linear_model.json
 """
 SEED = 2026  # of the plants that gains are judged on: not those of tuning
 
@@ -44,7 +44,7 @@ def main(argv: list[str] | None = None) -> int:
         help=f"parameter files, or shipped ones: {', '.join(gains_file.shipped())} (default npid)",
     )
     parser.add_argument("--model", metavar="FILE", default="moog_mcr_m_1002_bench", help="model file or preset")
-    parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="results of identify")
+    parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="linear_model.json of identify")
     parser.add_argument("--bench", metavar="JSON", nargs="+", default=[], help="responses that the node reference kept")
     parser.add_argument("--step", metavar="METRES", type=cli.positive, default=0.05, help="step (default 0.05)")
     parser.add_argument("--scatter", metavar="N", type=cli.count, default=0, help="scattered plants (default 0)")
@@ -55,7 +55,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def _evaluate(options: argparse.Namespace) -> None:
     model = load_model(options.model)
-    models = [load_identified(path).named(_label(path)) for path in options.identified]
+    models = [load_identified(path) for path in options.identified]
     bench = [_bench(Path(path)) for path in options.bench]
     noise = QUIET if options.no_noise else SensorNoise()
     results = {}
@@ -70,18 +70,12 @@ def _evaluate(options: argparse.Namespace) -> None:
     if options.json:
         print(json.dumps(_finite(results), ensure_ascii=False))
         return
-    console = Console(file=sys.stdout, highlight=False, markup=False)
+    console = cli.console()
     for name, result in results.items():
         _print_steps(console, name, result, options.step)
         _print_tracking(console, name, result)
     if options.scatter:
         _print_scatter(console, results, options.scatter)
-
-
-def _label(path: str) -> str:
-    """What tells identified models apart: the file's name, or its folder's where all files are called identify."""
-    file = Path(path)
-    return file.absolute().parent.name if file.stem == "identify" else file.stem
 
 
 def _bench(path: Path) -> tuple[str, Response]:
@@ -97,14 +91,12 @@ def _bench(path: Path) -> tuple[str, Response]:
 
 def _print_steps(console: Console, name: str, result: dict[str, Any], step: float) -> None:
     table = Table(title=f"{name}: step of {1e3 * step:g} mm", title_justify="left")
-    for title in ("plant", "Tr s", "Ts s", "OS %", "error µm", "effort V", "paper Tr", "paper Ts", "paper OS"):
+    for title in ("plant", "Tr s", "Ts s", "OS %", "error µm", "effort V", "paper Tr / Ts / OS"):
         table.add_column(title, justify="left" if title == "plant" else "right", no_wrap=True)
     for row in result["rows"]:
         if row["reference"] != "step":
             continue
-        printed = paper.beside(row["where"])
-        beside = [f"{v:g}" for v in printed[0]] if printed else ["–"] * 3
-        table.add_row(row["where"], *_step_cells(row), *beside)
+        table.add_row(row["where"], *_step_cells(row), _paper(row["where"], result))
     console.print(table)
     for agreement in result["agreement"]:
         printed = paper.beside(agreement["identified"])
@@ -112,10 +104,22 @@ def _print_steps(console: Console, name: str, result: dict[str, Any], step: floa
         text = f"identified {agreement['identified']} and nonlinear plant agree {word} 15 % on each figure"
         if printed:
             better = evaluation.better_than_paper(result, agreement["identified"])
-            limits = " / ".join(f"{v:g}" for v in printed[1])
             word = "better than" if better else "not better than"
-            text += f"; nonlinear plant {word} the paper's {limits} (Tr / Ts / OS)"
+            text += f"; nonlinear plant {word} the paper's {_triple(printed[1])}"
         console.print(text)
+
+
+def _paper(where: str, result: dict[str, Any]) -> str:
+    """The paper's figures for that line: its identified model, or its nonlinear one by what it was tuned on."""
+    if where == "nonlinear":
+        found = [paper.beside(a["identified"]) for a in result["agreement"]]
+        return ", ".join(_triple(f[1]) for f in found if f) or "–"
+    printed = paper.beside(where)
+    return _triple(printed[0]) if printed else "–"
+
+
+def _triple(printed: paper.PaperStep) -> str:
+    return " / ".join(f"{value:g}" for value in printed)
 
 
 def _step_cells(row: dict[str, Any]) -> list[str]:

@@ -30,7 +30,7 @@ from hydraulic_sim.model_file import load_model
 EPILOG = """\
 examples:
   python -m hydraulic_control tune --out runs/npid.yaml
-  python -m hydraulic_control tune --identified runs/chirp/identify.json --rise 0.2 --settling 0.45 --out runs/npid.yaml
+  python -m hydraulic_control tune --identified runs/chirp/linear_model.json --rise 0.2 --out runs/npid.yaml
   python -m hydraulic_control tune --controller pid --trials 0 --relay runs/relay.json --out runs/pid.yaml
 """
 
@@ -40,7 +40,7 @@ def main(argv: list[str] | None = None) -> int:
     parser = cli.parser("tune", __doc__.partition("\n")[0], EPILOG)
     parser.add_argument("--controller", choices=CONTROLLERS, default="npid", help="law to tune (default npid)")
     parser.add_argument("--model", metavar="FILE", default="moog_mcr_m_1002_bench", help="model file or preset")
-    parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="results of identify")
+    parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="linear_model.json of identify")
     parser.add_argument("--relay", metavar="JSON", help="result of the node relay, instead of one on the plant here")
     parser.add_argument("--relay-amplitude", metavar="V", type=cli.positive, default=0.5, help="default 0.5")
     parser.add_argument("--steps", metavar="METRES", type=cli.positive, nargs="+", default=[0.05, 0.01])
@@ -78,7 +78,7 @@ def _tune(options: argparse.Namespace) -> None:
     if options.json:
         print(json.dumps(_document(found, gains, tuned), ensure_ascii=False))
         return
-    out = Console(file=sys.stdout, highlight=False, markup=False)
+    out = cli.console()
     _print_points(out, found)
     _print_rules(out, gains)
     _print_tuned(out, options, model, tuned, noise)

@@ -1,0 +1,44 @@
+"""A plant as compiled code of others can run it: the pieces that a closed loop in one compiled function needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from . import base, rates
+from .plant import Plant
+from .trajectory import Array
+
+POSITION, VELOCITY, PRESSURE_A, PRESSURE_B, TRUE_POSITION = (
+    base.OUTPUTS.index(name) for name in ("position", "velocity", "pressure_a", "pressure_b", "true_position")
+)
+"""Columns of the outputs."""
+
+
+class Embedded(NamedTuple):
+    """``run(u, dt, start, longest_step, turn, on, parameters, hydraulic, x, memory, out, failure)`` integrates the
+    drive u (N,) [V] and fills out (N, outputs); it returns how many samples it could follow. Everything but u, dt [s],
+    start [s], the state (x, memory), out and failure (2,) is here."""
+
+    run: Callable
+    longest_step: float
+    turn: float
+    on: np.ndarray
+    parameters: Array
+    hydraulic: np.uint8
+    outputs: int
+
+
+def embedded(plant: Plant) -> Embedded:
+    """The pieces of a plant; the arrays are its own and are not to be written to."""
+    return Embedded(
+        plant._compiled.run,
+        plant.longest_step,
+        rates.STEP_TIMES_LANDS * plant.refinement,
+        plant._on,
+        plant._parameters,
+        plant._hydraulic,
+        len(base.OUTPUTS),
+    )
