@@ -41,7 +41,9 @@ def keyword(call: ast.Call, name: str) -> Any:
 def test_arguments_are_described_and_have_defaults() -> None:
     arguments = constant("ARGUMENTS")
     names = [name for name, _, _ in arguments]
-    assert names == ["plant", "model", "params", "enable", "record", "experiment", "estimate"]
+    assert names == [
+        "plant", "model", "params", "enable", "record", "experiment", "controller", "gains", "reference", "estimate",
+    ]  # fmt: skip
     assert all(isinstance(default, str) and text for _, default, text in arguments)
     defaults = {name: default for name, default, _ in arguments}
     assert defaults["plant"] in constant("PLANTS")
@@ -65,14 +67,25 @@ def test_nodes_have_the_names_of_the_contract() -> None:
     assert keyword(plant, "namespace") == contract.NAMESPACE
     (other,) = calls("Node")
     assert keyword(other, "namespace") == contract.NAMESPACE
-    started = {call.args[0].value for call in calls("_node") if isinstance(call.args[0], ast.Constant)}
-    assert started == {contract.RECORDER_NODE, contract.EXCITATION_NODE, contract.ESTIMATOR_NODE}
-    for executable in started:
-        assert (ROOT / "hydraulic_sysid/hydraulic_sysid/nodes" / f"{executable}.py").is_file()
+    started = [tuple(a.value for a in call.args[:2] if isinstance(a, ast.Constant)) for call in calls("_node")]
+    assert {name for _, name in started} == {
+        contract.RECORDER_NODE, contract.EXCITATION_NODE, contract.ESTIMATOR_NODE, contract.CONTROLLER_NODE,
+        contract.REFERENCE_NODE,
+    }  # fmt: skip
+    for package, executable in started:
+        assert (ROOT / package / package / "nodes" / f"{executable}.py").is_file()
+
+
+def test_the_laws_are_those_of_the_controller() -> None:
+    from hydraulic_control import gains_file, parameters
+
+    assert constant("CONTROLLERS") == parameters.CONTROLLERS
+    assert set(parameters.CONTROLLERS) <= set(gains_file.shipped())
 
 
 def test_parameters_that_are_set_are_declared() -> None:
     pytest.importorskip("rclpy")
+    from hydraulic_control.nodes import controller, reference
     from hydraulic_interfaces.nodes import plant_node
     from hydraulic_sim.nodes import simulator
     from hydraulic_sysid.nodes import estimator, excitation, recorder
@@ -81,15 +94,17 @@ def test_parameters_that_are_set_are_declared() -> None:
         "plant": {s.name for s in (*plant_node.PARAMETERS, *simulator.PARAMETERS)},
         "recorder": {s.name for s in recorder.PARAMETERS},
         "excitation": {s.name for s in excitation.PARAMETERS},
+        "controller": {s.name for s in controller.PARAMETERS},
+        "reference": {s.name for s in reference.PARAMETERS},
         "estimator": {s.name for s in estimator.PARAMETERS},
     }
     keys = [
         {k.value for k in node.keys if isinstance(k, ast.Constant)}
         for node in ast.walk(TREE)
-        if isinstance(node, ast.Dict) and node.lineno > TREE.body[-1].lineno - 60
+        if isinstance(node, ast.Dict) and node.lineno > TREE.body[-1].lineno - 90
     ]
     settings = [found for found in keys if found and not found & set(constant("PLANTS"))]
-    assert len(settings) == 4
+    assert len(settings) == 6
     for found in settings:
         assert any(found <= names for names in declared.values()), found
     file = yaml.safe_load((BRINGUP / "config/bench.yaml").read_text(encoding="utf-8"))
@@ -135,6 +150,8 @@ def test_it_describes_its_arguments(description: ModuleType) -> None:
         ({"plant": "can"}, ["can_driver"]),
         ({"estimate": "true"}, ["simulator", "estimator"]),
         ({"record": "/tmp/bag", "experiment": "chirp"}, ["simulator", "recorder", "excitation"]),
+        ({"controller": "npid"}, ["simulator", "controller"]),
+        ({"controller": "pid", "reference": "sine"}, ["simulator", "controller", "reference"]),
     ],
 )
 def test_it_starts_what_is_asked_for(description: ModuleType, chosen: dict[str, str], nodes: list[str]) -> None:
@@ -148,10 +165,19 @@ def test_it_starts_what_is_asked_for(description: ModuleType, chosen: dict[str, 
     assert [node.node_executable for node in started] == nodes
 
 
-def test_a_plant_that_is_unknown_is_refused(description: ModuleType) -> None:
+@pytest.mark.parametrize(
+    ("chosen", "complaint"),
+    [
+        ({"plant": "boat"}, "boat"),
+        ({"controller": "lqr"}, "lqr"),
+        ({"controller": "npid", "experiment": "chirp"}, "one of them"),
+        ({"reference": "step"}, "controller:="),
+    ],
+)
+def test_what_cannot_be_started_is_refused(description: ModuleType, chosen: dict[str, str], complaint: str) -> None:
     from launch import LaunchContext
 
     context = LaunchContext()
-    context.launch_configurations.update({name: value for name, value, _ in constant("ARGUMENTS")} | {"plant": "boat"})
-    with pytest.raises(RuntimeError, match="boat"):
+    context.launch_configurations.update({name: value for name, value, _ in constant("ARGUMENTS")} | chosen)
+    with pytest.raises(RuntimeError, match=complaint):
         description._nodes(context)

@@ -1,7 +1,8 @@
-"""The bench: a plant (simulated or on CAN), and on request a recorder and an excitation.
+"""The bench: a plant (simulated or on CAN), and on request a recorder, an excitation or a controller.
 
     ros2 launch hydraulic_bringup bench.launch.py plant:=sim
     ros2 launch hydraulic_bringup bench.launch.py plant:=sim record:=/tmp/bag experiment:=chirp
+    ros2 launch hydraulic_bringup bench.launch.py plant:=sim enable:=true controller:=npid reference:=staircase
 
 The plant is configured and activated; it moves nothing until `enable` is called (or enable:=true is given).
 """
@@ -17,6 +18,7 @@ from lifecycle_msgs.msg import Transition
 
 from launch import LaunchDescription
 
+CONTROLLERS = ("npid", "pid", "pole_placement")
 PLANTS = {"sim": ("hydraulic_sim", "simulator"), "can": ("hydraulic_can_driver", "can_driver")}
 
 ARGUMENTS = (
@@ -26,6 +28,9 @@ ARGUMENTS = (
     ("enable", "false", "let commands through as soon as the plant is active"),
     ("record", "", "folder of a new bag; empty: nothing is recorded"),
     ("experiment", "", "excitation plan (file or shipped name) to play; empty: none"),
+    ("controller", "", "law that closes the loop: npid, pid or pole_placement; empty: none"),
+    ("gains", "", "parameter file of the controller; empty: the shipped one of its law"),
+    ("reference", "", "trajectory to play: step, staircase, sine, …; empty: none"),
     ("estimate", "false", "run the estimator beside the plant, with the same model"),
 )
 
@@ -56,18 +61,36 @@ def _nodes(context, *_args, **_kwargs):
     actions = [plant, *_brought_up(plant)]
     if value["record"]:
         settings = {"output": value["record"], "stop_on_experiment_end": bool(value["experiment"])}
-        actions.append(_node("recorder", settings))
+        actions.append(_node("hydraulic_sysid", "recorder", settings))
     if value["estimate"].lower() in ("true", "1", "yes"):
-        actions.append(_node("estimator", {"model": value["model"]}))
+        actions.append(_node("hydraulic_sysid", "estimator", {"model": value["model"]}))
     if value["experiment"]:
         settings = {"plan": value["experiment"], "autostart": True, "listeners": 2 if value["record"] else 1}
-        actions.append(_node("excitation", settings))
+        actions.append(_node("hydraulic_sysid", "excitation", settings))
+    return [*actions, *_closed_loop(value)]
+
+
+def _closed_loop(value):
+    """The controller, and what it is to follow."""
+    law = value["controller"]
+    if not law:
+        if value["reference"] or value["gains"]:
+            raise RuntimeError("reference and gains are for a controller: name one with controller:=")
+        return []
+    if law not in CONTROLLERS:
+        raise RuntimeError(f"controller:={law}: allowed are {', '.join(CONTROLLERS)}")
+    if value["experiment"]:
+        raise RuntimeError("experiment and controller cannot both command the plant: give one of them")
+    settings = {"gains": value["gains"] or law, "controller": law, "autostart": True}
+    actions = [_node("hydraulic_control", "controller", settings)]
+    if value["reference"]:
+        actions.append(_node("hydraulic_control", "reference", {"kind": value["reference"], "autostart": True}))
     return actions
 
 
-def _node(executable, settings):
+def _node(package, executable, settings):
     return Node(
-        package="hydraulic_sysid",
+        package=package,
         executable=executable,
         name=executable,
         namespace="/actuator",
