@@ -95,7 +95,7 @@ def largest(plan: Plan, model: Model, limits: Limits | None = None, share: float
     limit = "drive" if room / peak <= cap else "amplitude given"
     best: Sized | None = None
     factor = high
-    for _ in range(_STEPS):
+    for step in range(_STEPS):
         seen, part, why = _try(plan, plant, limits, factor)
         if part <= 1.0:
             best, low = seen, factor
@@ -109,6 +109,8 @@ def largest(plan: Plan, model: Model, limits: Limits | None = None, share: float
         factor = factor * (1.0 - 0.5 * _TOLERANCE) / part
         if not low < factor < high:
             factor = 0.5 * (low + high)
+        if best is None and step > 0:
+            factor = min(factor, 0.6 * high)  # a pressure that lies at its least already does not tell by how much
     if best is None:
         raise ExcitationError(
             f"{plan.name}: no amplitude down to {factor * peak:.3g} V keeps within the limits; {limit} breaks first: "

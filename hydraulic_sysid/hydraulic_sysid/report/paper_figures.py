@@ -117,7 +117,9 @@ def thesis(result: Result) -> go.Figure:
     panels.y_axis(1, "mm", type="log", tickformat="~g", dtick=1)
     for panel in (0, 1):
         panels.x_axis(panel, "excitation over the bandwidth", type="category")
-    return panels.figure(340, barmode="group", bargap=0.3, margin={**_MARGIN, "t": 60}, hovermode="closest")
+    legend = {"orientation": "h", "x": 0, "y": -0.22, "yanchor": "top"}
+    margin = {**_MARGIN, "t": 60, "b": 90}
+    return panels.figure(380, barmode="group", bargap=0.3, legend=legend, margin=margin, hovermode="closest")
 
 
 def _missing(row: dict[str, Any] | None) -> float | None:

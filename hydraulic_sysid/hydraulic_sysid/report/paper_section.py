@@ -7,7 +7,7 @@ from typing import Any
 from hydraulic_sysid.display import number, quantity, span
 
 from . import paper_figures as figures
-from .html import Figures, choice, made_on, more, section, table, tag, text
+from .html import Figures, choice, made_on, section, table, tag, text
 
 Result = dict[str, Any]
 
@@ -180,7 +180,7 @@ def _or_dash(value: float | None) -> str:
 
 def _choices(result: Result) -> str:
     items = "".join(tag("li", text(item)) for item in result["left_out"])
-    return section("What the paper leaves out", "And what stands here in its place.", more("Choices", tag("ul", items)))
+    return section("What the paper leaves out", "And what stands here in its place.", tag("ul", items))
 
 
 def _fit(value: float | None, unit: str) -> str:

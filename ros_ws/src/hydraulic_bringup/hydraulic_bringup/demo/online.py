@@ -51,10 +51,11 @@ class Steps(Protocol):
 
 @dataclass(frozen=True)
 class Experiment:
-    """One excitation plan (a file) and the name of its bag."""
+    """One excitation plan (a file), the name of its bag, and the silence [s] of the plant that aborts it."""
 
     name: str
     plan: Path
+    state_timeout: float = 0.5
 
 
 def run(plant: str, model: Path, experiments: Sequence[Experiment], out: Path, steps: Steps) -> list[Path]:
@@ -175,7 +176,7 @@ def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, st
     excitation = crew.start(
         f"excitation_{suffix}", "hydraulic_sysid.nodes.excitation", "--ros-args",
         "-p", f"plan:={experiment.plan}", "-p", "autostart:=true", "-p", "exit_when_done:=true",
-        "-p", f"start_timeout:={_STEP_S}", "-p", "listeners:=2",
+        "-p", f"start_timeout:={_STEP_S}", "-p", "listeners:=2", "-p", f"state_timeout:={experiment.state_timeout}",
     )  # fmt: skip
     excitation.may_end = (0, 1)  # 1: not started, or aborted
     recorder.may_end = (0,)

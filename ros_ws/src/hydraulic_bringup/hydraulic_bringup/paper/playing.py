@@ -21,6 +21,8 @@ SENSORS = Sensors(
 )
 """Those of the simulator in the graph."""
 
+_SILENCE_S = 5.0  # a laptop that holds the plant up for a moment should not end a study of ten minutes
+
 
 def save(plans: Sequence[Plan], folder: Path) -> list[Experiment]:
     """Write the plans, each with its prediction, and name the experiments that play them."""
@@ -29,7 +31,7 @@ def save(plans: Sequence[Plan], folder: Path) -> list[Experiment]:
     for plan in plans:
         file = folder / f"{plan.name}.yaml"
         save_plan(plan, file)
-        experiments.append(Experiment(plan.name, file))
+        experiments.append(Experiment(plan.name, file, _SILENCE_S))
     return experiments
 
 
