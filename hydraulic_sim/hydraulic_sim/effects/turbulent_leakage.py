@@ -9,8 +9,11 @@ from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.kernels import smooth_root_gain
 
 
-def flow(load_pressure, orifice_transition, coefficient):
-    q = coefficient * load_pressure * smooth_root_gain(load_pressure, orifice_transition)
+TRANSITION = 1e4  # Pa, drop below which the leak turns laminar
+
+
+def flow(load_pressure, coefficient):
+    q = coefficient * load_pressure * smooth_root_gain(load_pressure, TRANSITION)
     return -q, q
 
 
@@ -38,6 +41,6 @@ EFFECT = Effect(
         2.0
         * p["coefficient"]
         * p["bulk_modulus"]
-        / (p["orifice_transition"] ** 0.5 * min(p["dead_volume_a"], p["dead_volume_b"]))
+        / (TRANSITION**0.5 * min(p["dead_volume_a"], p["dead_volume_b"]))
     ),
 )

@@ -1,0 +1,112 @@
+"""What of the library may be missing from a model, and where to look for it first.
+
+Everything follows from the effects' own records: the parameters that have a null value are what an effect brings,
+the others its shape, which is tried at a few values around the library's default.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from hydraulic_sim import slots
+from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sim.errors import ModelError
+from hydraulic_sim.model import Model
+
+SHAPES = (1.0, 0.3, 3.0)  # of the default
+SIZES = (1.0, 0.25)  # of the default, measured from the null value
+MOST_SHAPES = 5
+ANGLE = "rad"
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Parameter values of a candidate [SI, by key] at which its influence is looked at.
+
+    ``moved`` is the parameter that has left its null value ``null``, or None for the bare shape.
+    """
+
+    values: dict[str, float]
+    moved: str
+    null: float
+
+
+def candidates(model: Model) -> list[Effect]:
+    """Library effects that are off and could act in this model."""
+    found = []
+    for effect in model.library.values():
+        if effect.name in model.effects or effect.always_on:
+            continue
+        try:
+            model.with_effect(effect.name).check_complete()
+        except ModelError:  # another law has the slot, or the plant has no such stage
+            continue
+        found.append(effect)
+    return found
+
+
+def subsystem(effect: Effect) -> str:
+    """The balance that shows the effect."""
+    return slots.SLOTS[effect.slot].subsystem
+
+
+def probes(effect: Effect, lines: tuple[float, ...] = ()) -> Iterator[list[Probe]]:
+    """Groups of probes, one group per shape: each of its members moves one parameter off its null value.
+
+    ``lines`` [Hz]: frequencies at which something happens in the records; shapes in Hz are tried there too.
+    """
+    shape = [p for p in effect.parameters if p.null is None]
+    moved = [p for p in effect.parameters if p.null is not None and p.free]
+    grids = [_grid(p, lines) for p in shape]
+    first = tuple(g[0] for g in grids)
+    tried = [first] + [c for c in itertools.product(*grids) if c != first and _changes(c, first) == 1]
+    for values in tried[: MOST_SHAPES + len(lines)]:
+        given = {f"{effect.name}.{p.name}": v for p, v in zip(shape, values, strict=True)}
+        for size in SIZES if values == first else SIZES[:1]:
+            yield [_probe(effect, given, p, size) for p in moved]
+
+
+def inverse(null: float, default: float) -> bool:
+    """Whether a parameter acts by its inverse: its null value lies far above (a frequency, a rate)."""
+    return null > 5.0 * abs(default) > 0.0
+
+
+def between(null: float, value: float, share: float, default: float) -> float:
+    """The value that acts ``share`` times as much as ``value`` [SI], counted from the null value."""
+    if inverse(null, default):
+        return min(value / share, null) if share > 0.0 else null
+    return null + share * (value - null)
+
+
+def _changes(one: tuple[float, ...], other: tuple[float, ...]) -> int:
+    return sum(a != b for a, b in zip(one, other, strict=True))
+
+
+def _grid(p: Parameter, lines: tuple[float, ...]) -> list[float]:
+    low, high = p.bounds
+    if not p.free:
+        return [p.default]
+    if p.unit == ANGLE:
+        return [0.0, 1.5707963267948966]
+    values = [p.default * f for f in SHAPES]
+    if p.unit == "Hz":
+        values += list(lines)
+    return [v for v in values if low <= v <= high] or [p.default]
+
+
+def _probe(effect: Effect, shape: dict[str, float], p: Parameter, size: float) -> Probe:
+    assert p.null is not None
+    others = {f"{effect.name}.{q.name}": q.null for q in effect.parameters if q.null is not None and q.free}
+    low, high = p.bounds
+    step = p.default - p.null
+    if step == 0.0:  # a second parameter of its kind, at null by default
+        step = max(
+            (q.default - q.null for q in effect.parameters if q.null is not None and q.unit == p.unit),
+            key=abs,
+            default=0.0,
+        ) or 0.01 * (high - low)
+    value = p.default / size if inverse(p.null, p.default) else p.null + size * step
+    key = f"{effect.name}.{p.name}"
+    return Probe({**shape, **others, key: min(max(value, low), high)}, key, p.null)

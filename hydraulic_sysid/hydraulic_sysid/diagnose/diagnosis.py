@@ -1,0 +1,117 @@
+"""The whole of it: search, verdict, shape of what is left, balances, and one document."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.calibrate.estimate import CalibrationError, Settings
+from hydraulic_sysid.calibrate.segments import SegmentError
+from hydraulic_sysid.locate import LocateError, locate
+from hydraulic_sysid.records import Record
+
+from . import verdict
+from .anchor import keys_of
+from .document import document
+from .errors import parameter_errors
+from .levels import Level
+from .lines import spectral_lines
+from .pieces import split
+from .rivals import Rival, rivals
+from .search import Found, Search, Stage
+from .shape import Shape, shapes
+
+
+class DiagnosisError(ValueError):
+    """Records or model do not allow a diagnosis; the message says what is needed."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What came out. ``model``: with the missing effects on, fitted, its errors known and its history continued.
+
+    ``rivals``: models with another effect in the place of one found, where the data do not decide; ``result``: the
+    document (docs/report-json.md).
+    """
+
+    model: Model
+    rivals: dict[str, Model]
+    result: dict[str, Any]
+
+
+def diagnose(
+    model: Model,
+    records: Sequence[Record],
+    held_out: Sequence[Record] = (),
+    settings: Settings | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Find the library effects that ``model`` lacks to explain ``records``.
+
+    Parameters are fitted to ``records``; an effect counts only if it lowers the error on ``held_out`` too (default:
+    every third stretch of every record is held out). Records need drive and position; pressures tell more apart.
+
+    :raises DiagnosisError: no records, or unusable ones.
+    :raises hydraulic_sim.errors.ModelError: a model that does not compose.
+    :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
+    """
+    say = progress or (lambda _: None)
+    settings = settings or Settings()
+    if not records:
+        raise DiagnosisError("there is no record to diagnose")
+    try:
+        parts = split(records, held_out, Plant(model), settings.length)
+        found = Search(parts, settings, say, spectral_lines).run(model)
+    except (SegmentError, CalibrationError) as error:
+        raise DiagnosisError(str(error)) from None
+    others = {name: rivals(name, stage, found.final.level) for name, stage in found.rivals.items()}
+    kind = verdict.kind_of(found, others)
+    curves: list[Shape] = []
+    if kind == verdict.OUTSIDE:
+        curves = shapes(found.final.anchor, say)
+    say("balances")
+    before, after = _balances(found.base, records), _balances(found.final, records) if found.added else None
+    known = parameter_errors(found.final.anchor)
+    diagnosed = _finished(model, found, known, records, held_out)
+    result = document(model, records, held_out, parts, settings, found, others, known, kind, curves, before, after)
+    tied = {
+        rival.name: next(t for t in found.rivals[name].trials if t.name == rival.name).refit.model
+        for name, every in others.items()
+        for rival in every
+        if not rival.told_apart and kind == verdict.TIED
+    }
+    return Diagnosis(diagnosed, tied, result)
+
+
+def _balances(stage: Stage, records: Sequence[Record]) -> dict[str, Any] | None:
+    try:
+        return locate(stage.model, records, maps=False)
+    except (LocateError, SimulationError):
+        return None
+
+
+def _finished(model: Model, found: Found, known, records: Sequence[Record], held_out: Sequence[Record]) -> Model:
+    """The fitted model with standard errors, and one line of history for each effect that was added."""
+    done = found.final.model
+    for key, k in known.items():
+        error = k.standard_error
+        done = done.with_entry(key, standard_error=error if error < float("inf") else None)
+    before: Level = found.base.level
+    for name, after in found.steps:
+        done = done.with_history(
+            change=f"added {name}",
+            records=[r.name for r in records],
+            held_out=[r.name for r in held_out] or "every third stretch of each record",
+            error_before=float(f"{before.rms_held_out:.4g}"),
+            error_after=float(f"{after.rms_held_out:.4g}"),
+            error_unit="residual over noise, held out",
+        )
+        before = after
+    return done
+
+
+__all__ = ["Diagnosis", "DiagnosisError", "Level", "Rival", "diagnose", "keys_of"]

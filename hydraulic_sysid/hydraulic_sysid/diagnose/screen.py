@@ -1,0 +1,125 @@
+"""How much each candidate would explain, from its sensitivities beyond those of the free parameters (score test).
+
+Rao, Proc. Cambridge Phil. Soc. 44 (1948): the gain of a parameter not yet fitted follows from residuals and
+sensitivities at the present fit alone. Here with the bounds of all parameters, and at probes of finite size, as many
+effects have no derivative at their null value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.calibrate.steps import bounded_step
+
+from .anchor import Anchor, inner, project
+from .candidates import Probe, between, inverse, probes
+
+Array = NDArray[np.float64]
+
+ENOUGH = 60  # fitted pieces from which every second one does for a look
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """A candidate and the best its probes promise: ``gain`` of the sum of squares, ``start`` values [SI, by key]."""
+
+    effect: Effect
+    gain: float
+    start: dict[str, float]
+
+
+def screen(anchor: Anchor, effects: Sequence[Effect], lines: tuple[float, ...] = ()) -> list[Prospect]:
+    """All candidates, the most promising first; gains of the fitted pieces, half of which are looked at if many."""
+    part, share = sample(anchor)
+    found = [_prospect(part, effect, lines, share) for effect in effects]
+    return sorted((f for f in found if f is not None), key=lambda f: -f.gain)
+
+
+def sample(anchor: Anchor) -> tuple[Anchor, float]:
+    """The anchor on fitted pieces alone, on every second one if there are many; and how much of them that is."""
+    total = sum(int(f.sum()) for f in anchor.split.fitted)
+    every = 2 if total >= ENOUGH else 1
+    chosen = []
+    for fitted in anchor.split.fitted:
+        keep = np.zeros_like(fitted)
+        keep[np.flatnonzero(fitted)[::every]] = True
+        chosen.append(keep)
+    return anchor.some(chosen), sum(int(c.sum()) for c in chosen) / max(total, 1)
+
+
+def _prospect(anchor: Anchor, effect: Effect, lines: tuple[float, ...], share: float) -> Prospect | None:
+    plant = Plant(anchor.model.with_effect(effect.name))
+    best: Prospect | None = None
+    for group in probes(effect, lines):
+        found = _predict(anchor, plant, effect, group)
+        if found is not None and (best is None or found.gain > best.gain):
+            best = found
+    return None if best is None else replace(best, gain=best.gain / share)
+
+
+def _predict(anchor: Anchor, plant: Plant, effect: Effect, group: list[Probe]) -> Prospect | None:
+    shooting, linear = anchor.shooting, anchor.linear
+    columns = []
+    for probe in group:
+        moved = plant.with_parameters({**anchor.values, **probe.values})
+        try:
+            raw = shooting.run(moved)
+        except SimulationError:
+            return None
+        columns.append([r - lin.raw for r, lin in zip(raw, linear, strict=True)])
+    stacked = project(linear, [np.stack([c[i] for c in columns], axis=-1) for i in range(len(linear))])
+    new = inner(anchor.split, stacked, stacked)
+    usable = np.diag(new) > 1e-12 * max(float(np.diag(new).max()), 1e-300)
+    if not usable.all() or float(np.diag(new).min()) < 1e-6:
+        return None
+    cross = inner(anchor.split, anchor.beyond, stacked)
+    information = np.block([[anchor.information, cross], [cross.T, new]])
+    residual = [r[..., None] for r in anchor.residual]
+    gradient = np.concatenate(
+        [inner(anchor.split, anchor.beyond, residual)[:, 0], inner(anchor.split, stacked, residual)[:, 0]]
+    )
+    # In units of the probes: 0 is the null value, 1 the probe.
+    values = {**anchor.values, **{p.moved: 0.0 for p in group}}
+    scales = {**anchor.scales, **{p.moved: 1.0 for p in group}}
+    bounds = [*anchor.bounds, *(_reach(effect, p) for p in group)]
+    change = bounded_step(information, gradient, values, scales, bounds, 1e-9)
+    without = (
+        bounded_step(
+            anchor.information, gradient[: len(anchor.keys)], anchor.values, anchor.scales, anchor.bounds, 1e-9
+        )
+        if anchor.keys
+        else np.zeros(0)
+    )
+    gain = _quadratic(information, gradient, change) - _quadratic(
+        anchor.information, gradient[: len(anchor.keys)], without
+    )
+    start = dict(group[0].values)
+    for p, amount in zip(group, change[len(anchor.keys) :], strict=True):
+        start[p.moved] = between(p.null, p.values[p.moved], float(amount), _parameter(effect, p).default)
+    return Prospect(effect, float(gain), start)
+
+
+def _parameter(effect: Effect, probe: Probe) -> Parameter:
+    return next(p for p in effect.parameters if f"{effect.name}.{p.name}" == probe.moved)
+
+
+def _reach(effect: Effect, probe: Probe) -> tuple[float, float]:
+    """The parameter's bounds in units of the probe."""
+    parameter, value = _parameter(effect, probe), probe.values[probe.moved]
+    low, high = parameter.bounds
+    if inverse(probe.null, parameter.default):
+        return 0.0, value / low
+    span = value - probe.null
+    ends = sorted(((low - probe.null) / span, (high - probe.null) / span))
+    return ends[0], ends[1]
+
+
+def _quadratic(information: Array, gradient: Array, change: Array) -> float:
+    return float(-2.0 * gradient @ change - change @ information @ change)

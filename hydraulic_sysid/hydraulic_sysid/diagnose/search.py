@@ -1,0 +1,194 @@
+"""The search for what is missing: forward by refits of what the screen promises, backward by leaving out.
+
+Forward selection with backward elimination (Efroymson 1960; here as in Draper & Smith, Applied Regression Analysis,
+ch. 15), on pieces that were held out as well as on those that were fitted: an effect that does not lower both is none.
+Then every member is set against what would take its place, so that a stand-in that came first does not stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+from hydraulic_sysid.calibrate.estimate import Settings
+
+from .anchor import Anchor, anchor, fitted
+from .candidates import candidates
+from .chord import Refit, refit
+from .levels import Level, level, material, repaired
+from .pieces import Split
+from .screen import Prospect, screen
+
+PROMISING = 0.02  # of the best predicted gain, from which a candidate is refitted
+MOST_REFITS = 10
+FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
+NEAR = 0.7  # of the best gain, from which a refit is finished
+MOST_EFFECTS = 3
+NEEDED = 0.02  # of all that was repaired, which an effect must repair beside the others to stay
+MOST_SWAPS = 3
+LAST_STEPS = 8  # of a fit that begins where a quick refit ended
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate, refitted beside the effects that are on."""
+
+    name: str
+    predicted: float
+    refit: Refit
+    level: Level
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A model with some effects, fitted, and the candidates tried on top of it, best first."""
+
+    anchor: Anchor
+    level: Level
+    trials: list[Trial] = field(default_factory=list)
+    prospects: list[Prospect] = field(default_factory=list)
+
+    @property
+    def model(self) -> Model:
+        return self.anchor.model
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a search ended. ``rivals[name]``: the stage without that effect, with what was tried in its place."""
+
+    base: Stage
+    final: Stage
+    added: list[str]
+    steps: list[tuple[str, Level]]
+    rivals: dict[str, Stage]
+
+
+class Search:
+    """One search over one split of records."""
+
+    def __init__(
+        self, split: Split, settings: Settings, say: Say, lines: Callable[[Anchor], tuple[float, ...]]
+    ) -> None:
+        self.split, self.settings, self.say, self._lines = split, settings, say, lines
+
+    def stage(self, model: Model, settings: Settings | None = None) -> Stage:
+        """Fit a model and linearise it."""
+        there = anchor(fitted(model, self.split, settings or self.settings), self.split)
+        return Stage(there, level(self.split, there))
+
+    def explore(self, base: Stage, exclude: Sequence[str] = (), most: int = MOST_REFITS) -> Stage:
+        """Screen all candidates on a stage and refit the best."""
+        point = base.anchor
+        found = screen(point, [e for e in candidates(point.model) if e.name not in exclude], self._lines(point))
+        if not found:
+            return base
+        floor = max(PROMISING * found[0].gain, 0.2 * base.level.least)
+        trials = []
+        for prospect in [p for p in found if p.gain > floor][:most]:
+            self.say(f"refitting with {prospect.effect.name}")
+            done = refit(point, point.model.with_effect(prospect.effect.name), prospect.start)
+            trials.append(Trial(prospect.effect.name, prospect.gain, done, level(self.split, done)))
+        trials.sort(key=lambda t: t.level.total)
+        return replace(base, trials=trials, prospects=found)
+
+    def finish(self, base: Stage) -> Stage | None:
+        """The best of the trials, fitted to the end; None where none is worth it."""
+        worth = [t for t in base.trials if material(base.level, t.level)]
+        if not worth:
+            return None
+        top = base.level.total - worth[0].level.total
+        found = []
+        for trial in [t for t in worth if base.level.total - t.level.total >= NEAR * top][:FULL]:
+            self.say(f"fitting with {trial.name}")
+            try:
+                found.append(self.stage(trial.refit.model, replace(self.settings, most_steps=LAST_STEPS)))
+            except SimulationError:
+                continue
+        found = [f for f in found if material(base.level, f.level)]
+        return min(found, key=lambda f: f.level.total, default=None)
+
+    def run(self, model: Model) -> Found:
+        """Forward, backward, and every member against its rivals."""
+        self.say("fitting the model as it is")
+        base = stage = self.explore(self.stage(model))
+        added: list[str] = []
+        rivals: dict[str, Stage] = {}
+        while len(added) < MOST_EFFECTS:
+            better = self.finish(stage)
+            if better is None or not self._worth(base.level, stage.level, better.level, bool(added)):
+                break
+            name = next(e for e in better.model.effects if e not in stage.model.effects)
+            rivals = {name: stage}
+            added.append(name)
+            stage = self.explore(better, most=MOST_REFITS // 2)
+        if len(added) > 1:
+            stage, added, rivals = self._review(base, stage, added)
+        return Found(base, stage, added, self._steps(base, stage, added), rivals)
+
+    def _worth(self, base: Level, before: Level, after: Level, further: bool) -> bool:
+        """Whether a further effect repairs a good part of what is left, or of what there was."""
+        if not further:
+            return True
+        return repaired(before, after) >= 0.5 or repaired(base, after) - repaired(base, before) >= NEEDED
+
+    def _review(self, base: Stage, stage: Stage, added: list[str]) -> tuple[Stage, list[str], dict[str, Stage]]:
+        """Leave out what the others make superfluous; put in an effect's place what fits better there."""
+        rivals: dict[str, Stage] = {}
+        swaps = 0
+        queue = list(added[:-1]) + added[-1:]
+        while queue and len(added) > 0:
+            name = queue.pop(0)
+            if name not in added:
+                continue
+            if len(added) == 1:
+                rivals[name] = base
+                break
+            without = self.stage(stage.model.without_effect(name))
+            lost = without.level.total - stage.level.total
+            if not material(without.level, stage.level) or lost < NEEDED * (base.level.total - stage.level.total):
+                self.say(f"leaving out {name}")
+                added.remove(name)
+                stage, rivals, queue = without, {}, list(added)
+                continue
+            without = self.explore(without, most=MOST_REFITS // 2)
+            rivals[name] = without
+            other = self.finish(without)
+            if (
+                other is not None
+                and name not in other.model.effects
+                and swaps < MOST_SWAPS
+                and (stage.level.total - other.level.total > stage.level.least)
+            ):
+                new = next(e for e in other.model.effects if e not in without.model.effects)
+                self.say(f"{new} in the place of {name}")
+                added[added.index(name)] = new
+                stage, swaps = other, swaps + 1
+                rivals, queue = {new: without}, [a for a in added if a != new]
+        return stage, added, rivals
+
+    def _steps(self, base: Stage, final: Stage, added: list[str]) -> list[tuple[str, Level]]:
+        """The level after each effect, in the order of how much it repairs: the largest first."""
+        if len(added) <= 1:
+            return [(name, final.level) for name in added]
+        single = {}
+        for name in added:
+            trial = next((t for t in base.trials if t.name == name), None)
+            single[name] = trial.level if trial is not None else None
+        order = sorted(added, key=lambda n: single[n].total if single[n] is not None else float("inf"))  # type: ignore[union-attr]
+        steps: list[tuple[str, Level]] = []
+        model = base.model
+        for i, name in enumerate(order):
+            if i == len(order) - 1:
+                steps.append((name, final.level))
+                break
+            model = model.with_effect(
+                name, {k.split(".", 1)[1]: final.model.value(k) for k in final.model.keys() if k.startswith(f"{name}.")}
+            )
+            steps.append((name, self.stage(model).level))
+        added[:] = order
+        return steps

@@ -1,0 +1,50 @@
+"""A flow of any shape from one chamber to the other.
+
+    q_A = -height*hat(z), q_B = height*hat(z)
+
+hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides. ``over`` chooses z by its place in ("load_pressure", "position", "velocity", "opening", "time").
+
+Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
+"""
+
+from hydraulic_sim.effect import Effect, Parameter
+
+VARIABLES = ("load_pressure", "position", "velocity", "opening", "time")
+
+
+def add(load_pressure, position, velocity, opening, t, over, centre, width, height):
+    z = load_pressure
+    if over == 1.0:
+        z = position
+    elif over == 2.0:
+        z = velocity
+    elif over == 3.0:
+        z = opening
+    elif over == 4.0:
+        z = t
+    part = 1.0 - abs(z - centre) / width
+    q = height * part if part > 0.0 else 0.0
+    return -q, q
+
+
+EFFECT = Effect(
+    slot="flow",
+    summary="a flow across the piston of any shape",
+    kernel=add,
+    parameters=(
+        Parameter("height", "m^3/s", 1e-06, (-1.0, 1.0), "height of the triangle", "shape of a residual", null=0.0),
+        Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", "shape of a residual", free=False),
+        Parameter(
+            "centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", "shape of a residual", free=False
+        ),
+        Parameter(
+            "width", "1", 1.0, (1e-12, 1e12), "half the foot [the variable's unit]", "shape of a residual", free=False
+        ),
+    ),
+    equation="q_A = -height*hat(z), q_B = height*hat(z)",
+    source="de Boor (1978), A Practical Guide to Splines, ch. III",
+    excited_by="whatever moves the variable",
+    confused_with=(),
+    told_apart_by="the variable over which the curve explains most",
+    order=90,
+)

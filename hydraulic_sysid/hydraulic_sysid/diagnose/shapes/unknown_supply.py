@@ -1,0 +1,47 @@
+"""A supply pressure of any shape.
+
+    p_S = p_0 + height*hat(z)
+
+hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides. ``over`` chooses z by its place in ("size_of_opening", "velocity", "time", "load_pressure").
+
+Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
+"""
+
+from hydraulic_sim.effect import Effect, Parameter
+
+VARIABLES = ("size_of_opening", "velocity", "time", "load_pressure")
+
+
+def add(opening, velocity, t, load_pressure, over, centre, width, height):
+    z = abs(opening)
+    if over == 1.0:
+        z = velocity
+    elif over == 2.0:
+        z = t
+    elif over == 3.0:
+        z = load_pressure
+    part = 1.0 - abs(z - centre) / width
+    return height * part if part > 0.0 else 0.0
+
+
+EFFECT = Effect(
+    slot="ripple",
+    summary="a supply pressure of any shape",
+    kernel=add,
+    parameters=(
+        Parameter("height", "Pa", 100000.0, (-1e8, 1e8), "height of the triangle", "shape of a residual", null=0.0),
+        Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", "shape of a residual", free=False),
+        Parameter(
+            "centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", "shape of a residual", free=False
+        ),
+        Parameter(
+            "width", "1", 1.0, (1e-12, 1e12), "half the foot [the variable's unit]", "shape of a residual", free=False
+        ),
+    ),
+    equation="p_S = p_0 + height*hat(z)",
+    source="de Boor (1978), A Practical Guide to Splines, ch. III",
+    excited_by="whatever moves the variable",
+    confused_with=(),
+    told_apart_by="the variable over which the curve explains most",
+    order=90,
+)

@@ -1,0 +1,82 @@
+"""From figures to one of four verdicts, and its sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from .rivals import Rival
+from .search import Found
+from .shape import Shape
+
+MISSING = "missing"
+TIED = "cannot be told apart"
+COMPLETE = "complete"
+OUTSIDE = "outside the library"
+
+UNSEEN = 0.015  # mean square beyond the noise that a noise floor estimated from data may miss
+UNEXPLAINED = 0.1  # of what was to be explained: more than that left is no matter of a law's details
+LARGE = 1.03  # residual over noise from which something is missing although no effect of the library is
+
+
+def left_over(found: Found) -> float:
+    """Mean square beyond the noise, over that before anything was added (0…1)."""
+    base, final = found.base.level, found.final.level
+    seen = max(base.variance - 1.0 - UNSEEN, 0.0)
+    left = max(final.variance - 1.0 - UNSEEN, 0.0)
+    return left / seen if seen > 0.0 else 0.0
+
+
+def kind_of(found: Found, rivals: Mapping[str, Sequence[Rival]]) -> str:
+    """The verdict's kind."""
+    final = found.final.level
+    if not found.added:
+        return OUTSIDE if final.variance > LARGE**2 else COMPLETE
+    if left_over(found) > UNEXPLAINED and final.variance > 1.0 + 2.0 * UNSEEN:
+        return OUTSIDE
+    return TIED if any(not r.told_apart for every in rivals.values() for r in every) else MISSING
+
+
+def sentences(found: Found, rivals: Mapping[str, Sequence[Rival]], kind: str, shapes: Sequence[Shape]) -> str:
+    """What a user reads first."""
+    base, final = found.base.level.rms_held_out, found.final.level.rms_held_out
+    fell = f"On held-out data the residual went from {base:.3g} to {final:.3g} times the noise."
+    if kind == COMPLETE:
+        return (
+            f"Complete: on held-out data the residual is {final:.3g} times the noise, and no effect of the library "
+            "lowers it by more than chance."
+        )
+    if kind == MISSING:
+        return f"Missing: {_and(found.added)}. {fell} {_why_not(found, rivals)}".strip()
+    if kind == TIED:
+        parts = []
+        for name in found.added:
+            same = [r.name for r in rivals.get(name, ()) if not r.told_apart]
+            parts.append(f"one of {{{', '.join([name, *same])}}}" if same else name)
+        return f"Missing: {_and(parts)}; these data cannot tell {'them' if len(parts) == 1 else 'all'} apart. {fell}"
+    text = "Outside the library: something is left that no effect of it explains. "
+    if found.added:
+        text += f"The nearest is {_and(found.added)}. {fell} "
+    else:
+        text += f"On held-out data the residual is {final:.3g} times the noise. "
+    if shapes:
+        best = shapes[0]
+        text += (
+            f"It looks like {best.summary} over {best.variable.replace('_', ' ')}, which would explain "
+            f"{100 * best.share:.0f} % of what is left."
+        )
+    return text.strip()
+
+
+def _why_not(found: Found, rivals: Mapping[str, Sequence[Rival]]) -> str:
+    parts = []
+    for name in found.added:
+        if rivals.get(name):
+            second = rivals[name][0]
+            parts.append(
+                f"Why not {second.name} for {name}: with it {second.level.rms_held_out:.3g} times the noise are left."
+            )
+    return " ".join(parts)
+
+
+def _and(words: Sequence[str]) -> str:
+    return " and ".join(words) if len(words) < 3 else ", ".join(words[:-1]) + " and " + words[-1]
