@@ -81,6 +81,15 @@ class Bench:
             self.master.boot(node)
         self.readings = {node.name: self.master.readings(node) for node in self.bus.nodes.values()}
 
+    def inspect(self) -> None:
+        """Check who is there and read back what they are set to; nothing is written.
+
+        :raises DeviceError: a device does not answer, or is another one.
+        """
+        for node in self.bus.nodes.values():
+            self.master.identify(node)
+        self.readings = {node.name: self.master.readings(node) for node in self.bus.nodes.values()}
+
     def start(self) -> None:
         """All devices operational, all frames there, the valve DISABLED at 0 V.
 

@@ -31,6 +31,7 @@ from hydraulic_can_driver.bus import (
     Signal,
 )
 from hydraulic_can_driver.codec import raw_range
+from hydraulic_can_driver.eds_check import check_against_eds
 from hydraulic_can_driver.errors import BusFileError
 
 FORMAT = "hydraulic-bus-1"
@@ -84,6 +85,7 @@ def load_bus(name: str | Path) -> Bus:
     top.done()
     bus = replace(bus, nodes={name: node for name, (_, node) in entries.items()})
     _check(bus, nodes)
+    check_against_eds(bus)
     return bus
 
 

@@ -60,7 +60,7 @@ def event(kind: str, stamp: int, **more: Any) -> Message:
 
 def bag(folder: Path, messages: Sequence[Message], plugin: StoragePlugin = StoragePlugin.MCAP) -> Path:
     """Written by a library of its own, so that what reads it is not tested by what wrote it."""
-    types = {"experiment": STRING, "pressure": PRESSURE}
+    types = {"experiment": STRING, "description": STRING, "pressure": PRESSURE}
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
         known = {}
         for name, stamp, message in sorted(messages, key=lambda m: m[1]):
@@ -258,3 +258,17 @@ def test_a_bag_that_was_cut_off_says_what_to_do(tmp_path: Path, keep: int) -> No
     file.write_bytes(data[:keep])
     with pytest.raises(BagError, match=r"cut off or damaged .* python -m hydraulic_sysid recover"):
         read_records(path)
+
+
+def test_what_the_plant_says_of_itself_goes_into_the_record(tmp_path: Path) -> None:
+    told = {"hardware": "can: bench", "imitated_effects": ["valve_deadband"], "devices": {"valve": {"settings": []}}}
+    texts = [json.dumps({"hardware": "older"}), json.dumps(told), "no JSON", "[1]"]
+    messages = [("description", START + n, STORE.types[STRING](text)) for n, text in enumerate(texts)]
+    (record,) = read_records(bag(tmp_path / "bag", [*streams(), *messages]))
+    assert record.description["plant"] == told
+    assert any("imitate valve_deadband" in note for note in record.description["notes"])
+
+
+def test_a_plant_that_says_nothing(tmp_path: Path) -> None:
+    (record,) = read_records(bag(tmp_path / "bag", list(streams())))
+    assert "plant" not in record.description

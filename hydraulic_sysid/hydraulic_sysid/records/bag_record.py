@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hydraulic_interfaces.contract import PISTON, SERVOVALVE, topic
 from hydraulic_sysid.bag import cdr, reader
 from hydraulic_sysid.bag.reader import Bag
+from hydraulic_sysid.bag.types import string_data
 from hydraulic_sysid.bag.writer import SUFFIX
 from hydraulic_sysid.records.errors import BagError, TimeError
 from hydraulic_sysid.records.experiments import Span, spans
@@ -34,13 +35,14 @@ def read_bag(path: Path, irregular: str = "error") -> list[Record]:
     """Records in a bag: one for every experiment that was started in it, or one of everything.
 
     State and pressures of the same stamp make a sample. `command` and `reference` give their latest value
-    before it, or of the same stamp. A channel whose values are all NaN was not measured, and is absent.
+    before it, or of the same stamp. A channel whose values are all NaN was not measured, and is absent. What the plant
+    says of itself becomes ``description["plant"]``: how the amplifier of a real bench is set, for one.
 
     :raises BagError: unreadable, no `state`, a message is no contract message, or values are missing in
         some samples only.
     :raises TimeError: a stamp repeats or goes back, or samples are missing (``irregular`` = "error").
     """
-    names = ("state", *PRESSURES, *HELD, "experiment")
+    names = ("state", *PRESSURES, *HELD, "experiment", "description")
     bag = reader.read(path, [topic(name) for name in names])
     notes: list[str] = []
     stamps, channels = _sampled(bag, notes)
@@ -48,10 +50,13 @@ def read_bag(path: Path, irregular: str = "error") -> list[Record]:
     channels = _measured(path, stamps, channels)
     ordered = {name: channels[name] for name in ("command", "drive", *channels) if name in channels}
     drive_from_command(ordered, notes)
+    plant = _plant(bag)
+    if imitated := plant.get("imitated_effects"):
+        notes.append(f"plant: its devices are set so that they imitate {', '.join(map(str, imitated))}")
     records = []
     for span in spans(bag, stamps):
         lacking = [_note(name, count - span.first) for name, count in early.items() if count > span.first]
-        records += _records(path, irregular, span, stamps, ordered, [*notes, *lacking], bag.custom)
+        records += _records(path, irregular, span, stamps, ordered, [*notes, *lacking], bag.custom, plant)
     return records
 
 
@@ -63,6 +68,7 @@ def _records(
     channels: Mapping[str, Array],
     notes: list[str],
     custom: Mapping[str, str],
+    plant: dict[str, Any],
 ) -> list[Record]:
     chosen = slice(span.first, span.last)
     start = int(stamps[span.first])
@@ -76,11 +82,26 @@ def _records(
     description: dict[str, Any] = {"start_ns": start}
     if span.experiment:
         description["experiment"] = span.experiment
+    if plant:
+        description["plant"] = plant
     if custom:
         description["bag"] = {key: _plain(value) for key, value in custom.items() if key not in _TOLD_ELSEWHERE}
     name = path.name.removesuffix(SUFFIX)
     title = f"{name}.{span.name}" if span.name else name
     return evenly_sampled(samples, irregular, title, [*notes, *span.notes], description)
+
+
+def _plant(bag: Bag) -> dict[str, Any]:
+    """What the plant has said of itself, last; empty where it has said nothing."""
+    stream = bag.streams.get(topic("description"))
+    for payload in reversed(stream.payloads if stream else ()):
+        try:
+            told = json.loads(string_data(payload))
+        except Exception:  # anybody may publish anything there
+            continue
+        if isinstance(told, dict):
+            return told
+    return {}
 
 
 def _sampled(bag: Bag, notes: list[str]) -> tuple[Stamps, dict[str, Array]]:

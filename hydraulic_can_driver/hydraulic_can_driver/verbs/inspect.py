@@ -1,0 +1,76 @@
+"""``inspect [--bus F] [--interface I] [--channel C] [--json]``: what the devices do to drive and measurements.
+
+Reads only; nothing is written and nothing moves. Not to be used while the driver runs: two would ask the same devices.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import replace
+
+from rich.console import Console
+from rich.table import Table
+
+from hydraulic_can_driver import readback
+from hydraulic_can_driver.bench import Bench
+from hydraulic_can_driver.bus_file import load_bus, shipped
+from hydraulic_can_driver.errors import BusFileError, CanDriverError
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print the settings of all devices. Exit code 0; 1 when a device does not answer as it should; 2 bad usage."""
+    parser = argparse.ArgumentParser(prog="inspect", description="Read back the settings of the devices on the bus.")
+    parser.add_argument(
+        "--bus", default="bench", metavar="F", help=f"bus file, or a shipped one: {', '.join(shipped())}"
+    )
+    parser.add_argument("--interface", default="", metavar="I", help="python-can interface; default: that of the file")
+    parser.add_argument("--channel", default="", metavar="C", help="its channel; default: that of the file")
+    parser.add_argument("--json", action="store_true", help="print JSON, as it is kept with a record")
+    options = parser.parse_args(argv)
+    try:
+        bus = load_bus(options.bus)
+        bus = replace(bus, interface=options.interface or bus.interface, channel=options.channel or bus.channel)
+        bench = Bench(bus)
+        try:
+            bench.inspect()
+        finally:
+            bench.close()
+    except BusFileError as error:
+        print(f"inspect: {error}", file=sys.stderr)
+        return 2
+    except CanDriverError as error:
+        print(f"inspect: {error}", file=sys.stderr)
+        return 1
+    found = readback.description(bus, bench.readings)
+    if options.json:
+        print(json.dumps(found, indent=2))
+    else:
+        _show(found)
+    return 0
+
+
+def _show(found: dict) -> None:
+    table = Table(title=f"settings of the devices on {found['bus']}")
+    for column in ("device", "setting", "object", "value", "neutral", "looks like"):
+        table.add_column(column)
+    for name, device in found["devices"].items():
+        for row in device["settings"]:
+            neutral = "" if row["neutral"] is None else f"{row['neutral']:g} {row['unit']}"
+            style = "bold" if row["acts"] else "dim"
+            effect = row["effect"] if row["acts"] else ""
+            table.add_row(
+                name, row["name"], row["object"], f"{row['value']:g} {row['unit']}", neutral, effect, style=style
+            )
+        table.add_section()
+    console = Console()
+    console.print(table)
+    if found["imitated_effects"]:
+        console.print(f"The devices imitate these effects of the hydraulics: {', '.join(found['imitated_effects'])}.")
+    else:
+        console.print("All settings are neutral: nothing but the hydraulics shapes the records.")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,142 @@
+"""The power of either side fails, at any step from boot to stop: the drive ends at 0 V and stays there."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import can
+import pytest
+
+from hydraulic_can_driver.cia408 import State
+from hydraulic_can_driver.errors import CanDriverError
+from hydraulic_can_driver.virtual import faults as upset
+
+# When it happens: kind, device and detail of an event in the devices, and which occurrence of it.
+STEPS = {
+    "identity": ("sdo read", "valve", "0x1000:0", 1),
+    "setpoint 0": ("sdo write", "valve", "0x6300:1", 1),
+    "boot list": ("sdo write", "valve", "0x6043:0", 1),
+    "heartbeat": ("sdo write", "valve", "0x1017:0", 1),
+    "mapping": ("sdo write", "valve", "0x1603:1", 1),
+    "other devices": ("sdo write", "lvdt", "0x6005:1", 1),
+    "read-back": ("sdo read", "valve", "0x6324:1", 1),
+    "watch": ("sdo write", "valve", "0x1016:1", 1),
+    "operational": ("nmt", "valve", "OPERATIONAL", 1),
+    "first SYNC": ("sync", "", "1", 1),
+    "disabled": ("state", "valve", "disabled", 1),
+    "hold": ("state", "valve", "hold", 1),
+    "active": ("state", "valve", "active", 1),
+    "driving": ("sync", "", "60", 1),
+    "disabling": ("state", "valve", "disabled", 2),
+    "init": ("state", "valve", "init", 1),
+    "pre-operational": ("nmt", "valve", "PRE-OPERATIONAL", 2),
+}
+
+
+class Life(threading.Thread):
+    """A bench from boot to stop, with 2 V in between; errors of the driver end it, after an attempt to stop."""
+
+    def __init__(self, here: Any) -> None:
+        super().__init__(daemon=True)
+        self.here = here
+        self.problem = ""
+
+    def run(self) -> None:
+        here = self.here
+        try:
+            self.go_through()
+        except CanDriverError as error:
+            self.problem = str(error)
+        if here.loop is not None:
+            here.loop.ending = True
+            here.loop.join()
+        try:
+            here.bench.stop()
+        except CanDriverError as error:
+            self.problem = self.problem or str(error)
+
+    def go_through(self) -> None:
+        here = self.here
+        here.run()
+        here.enable(2.0)
+        end = time.monotonic() + 20.0
+        while here.devices.syncs < 80 and not here.bench.problem and time.monotonic() < end:
+            time.sleep(0.005)
+        here.bench.follow(State.DISABLED)
+        self.problem = here.bench.problem
+
+
+def happened(here: Any, wait_until: Any, life: Life, event: threading.Event) -> None:
+    wait_until(lambda: event.is_set() or not life.is_alive(), "the step", 60.0)
+    assert event.is_set(), f"the step did not come: {life.problem}"
+
+
+def ends_at_zero(here: Any, wait_until: Any) -> None:
+    wait_until(lambda: here.devices.drive == 0.0, "0 V at the spool")
+    end = time.monotonic() + 0.2
+    while time.monotonic() < end:
+        assert here.devices.drive == 0.0
+        time.sleep(0.005)
+
+
+CUTS = [("valve", step) for step in STEPS]
+CUTS += [("lvdt", step) for step in ("other devices", "operational", "first SYNC", "active", "driving", "disabling")]
+
+
+@pytest.mark.parametrize(("node", "step"), CUTS)
+def test_power_of_a_device(node: str, step: str, rig: Callable[..., Any], wait_until: Any) -> None:
+    kind, name, detail, count = STEPS[step]
+    here = rig(missed_cycles=20, state_change=0.5)
+    cut, event = upset.PowerCut(node), threading.Event()
+    here.devices.at(kind, name, detail, cut, count)
+    here.devices.listeners.append(
+        lambda e: event.set() if (e.kind, e.node, e.detail) == ("power", node, "off") else None
+    )
+    life = Life(here)
+    life.start()
+    happened(here, wait_until, life, event)
+    life.join(60.0)
+    assert not life.is_alive()
+    ends_at_zero(here, wait_until)
+    if step not in ("init", "pre-operational") and not (node == "lvdt" and step == "disabling"):
+        assert node in life.problem, "the diagnostic names the device"
+    here.devices.clear(cut)
+    ends_at_zero(here, wait_until)
+    assert here.devices.valve.machine.state.label in ("init", "disabled", "not ready", "fault init", "fault disabled")
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_power_of_the_driver(
+    step: str, rig: Callable[..., Any], wait_until: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the step on not one more frame of the driver reaches the bus: as if its plug had been pulled."""
+    kind, name, detail, count = STEPS[step]
+    here = rig(lost_after=0.3, state_change=0.5)
+    event = threading.Event()
+    seen = [0]
+
+    def pull(happening: Any) -> None:
+        if (happening.kind, happening.node, happening.detail) == (kind, name, detail):
+            seen[0] += 1
+            if seen[0] == count:
+                event.set()
+
+    send = here.bench.master.can.send
+
+    def plugged(message: can.Message, timeout: float | None = None) -> None:
+        if not event.is_set():
+            send(message, timeout)
+
+    monkeypatch.setattr(here.bench.master.can, "send", plugged)
+    here.devices.listeners.append(pull)
+    life = Life(here)
+    life.start()
+    happened(here, wait_until, life, event)
+    ends_at_zero(here, wait_until)
+    wait_until(lambda: here.devices.valve.machine.state.label != "active", "a valve that has given up")
+    here.loop and setattr(here.loop, "ending", True)
+    life.join(60.0)
+    ends_at_zero(here, wait_until)
