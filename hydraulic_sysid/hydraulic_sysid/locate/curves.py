@@ -1,0 +1,71 @@
+"""Basis functions over one variable, and operators with a memory, from which directions are made."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+Array = NDArray[np.float64]
+
+_REACH = 0.995  # quantile of the size at which the outermost knot of a signed variable lies
+
+
+def tents(values: Array, knots: Array) -> Array:
+    """Piecewise linear basis ``(K, n)``: one at its knot, zero at its neighbours; constant beyond the ends."""
+    if knots.size < 2:
+        return np.ones((1, values.size))
+    inside = np.clip(values, knots[0], knots[-1])
+    left = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, knots.size - 2)
+    weight = (inside - knots[left]) / (knots[left + 1] - knots[left])
+    basis, column = np.zeros((knots.size, values.size)), np.arange(values.size)
+    basis[left, column] = 1.0 - weight
+    basis[left + 1, column] = weight
+    return basis
+
+
+def signed_knots(values: Array, number: int) -> Array:
+    """Knots on both sides of zero (``number`` each), quadratically denser towards it: there friction and lands bend."""
+    reach = float(np.quantile(np.abs(values), _REACH))
+    parts = reach * np.linspace(0.0, 1.0, number + 1) ** 2
+    return np.unique(np.concatenate((-parts, parts)))
+
+
+def even_knots(values: Array, number: int) -> Array:
+    """Evenly spaced knots over the range, the outermost 0.2 % left out."""
+    low, high = np.quantile(values, (0.002, 0.998))
+    return np.unique(np.linspace(low, high, number))
+
+
+def shifted(values: Array, samples: int) -> Array:
+    """The signal ``samples`` ago, its first value before the beginning."""
+    return np.concatenate((np.full(samples, values[0]), values[: values.size - samples]))
+
+
+def lagged(values: Array, dt: float, time: float) -> Array:
+    """First-order lag of a time constant [s], settled at the beginning."""
+    pole = np.exp(-dt / time)
+    return lfilter([1.0 - pole], [1.0, -pole], values, zi=[values[0] * pole])[0]
+
+
+@njit("f8[::1](f8[::1], f8)", cache=True, nogil=True)
+def play(values: Array, half_width: float) -> Array:
+    """Output of a play (backlash) operator."""
+    out = np.empty_like(values)
+    held = values[0]
+    for i in range(len(values)):
+        held = min(max(held, values[i] - half_width), values[i] + half_width)
+        out[i] = held
+    return out
+
+
+@njit("f8[::1](f8[::1], f8)", cache=True, nogil=True)
+def rate_limited(values: Array, step: float) -> Array:
+    """The signal changing by at most ``step`` per sample."""
+    out = np.empty_like(values)
+    held = values[0]
+    for i in range(len(values)):
+        held += min(max(values[i] - held, -step), step)
+        out[i] = held
+    return out

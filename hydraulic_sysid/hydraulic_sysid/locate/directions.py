@@ -1,0 +1,269 @@
+"""What each subsystem can do to the balances: directions in which its faults move them.
+
+None of them is an effect of the library. A subsystem is allowed any smooth function of the variables that its physics
+can depend on, acting where its physics acts: a force in the force balance alone; an opening in both flows, by the root
+of each open land's drop, with opposite signs; leakage by the pressures; oil by the rate of the pressures; the supply in
+the flow of the side that it feeds; a position sensor in both flows by the areas and in the force by the mass. A fault
+that no file of the library knows moves the balances in these directions all the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .curves import lagged, play, rate_limited, shifted, tents
+from .knots import Knots
+from .signals import Signals
+
+Array = NDArray[np.float64]
+
+LAGS = (1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 32e-3, 64e-3)
+"""Seconds ago that a valve may follow what it was told."""
+_SUPPLY_LAGS = (0.1, 1.0)
+_WIDTHS = (0.003, 0.01, 0.03)
+_GAPS = (1e-4, 5e-4, 2e-3)
+_RATES = (1.0, 3.0, 10.0, 30.0)
+_RESONANCES = (3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0)
+_CREEP = (0.01, 0.03, 0.1)
+
+
+@dataclass
+class Family:
+    """The directions of one subsystem: parallel lists of the variable each goes over, and what it adds per balance."""
+
+    subsystem: str
+    variables: list[str] = field(default_factory=list)
+    parts: list[dict[str, Array]] = field(default_factory=list)
+
+    def add(self, variable: str, **parts: Array) -> None:
+        """One direction; ``parts`` are (n,) by balance."""
+        self.variables.append(variable)
+        self.parts.append(parts)
+
+
+def families(s: Signals, balances: tuple[str, ...], k: Knots, waves: Array) -> list[Family]:
+    """All subsystems that these balances can show; ``waves`` (W, n) are oscillations that any of them may have."""
+    found = [_force(s, k, waves)] if "force" in balances else []
+    if not s.hydraulic:
+        return [*found, _drive(s, k), _sensor(s, k, waves)]
+    if "flow_a" in balances or "flow_b" in balances:
+        found += [_valve(s, k, waves, "spool" in balances), _flow(s, k), _fluid(s, k)]
+        found += [_supply(s, k, waves, "supply" in balances), _sensor(s, k, waves)]
+    else:
+        found += [_valve(s, k, waves, True)] if "spool" in balances else []
+        found += [_supply(s, k, waves, True)] if "supply" in balances else []
+    return found
+
+
+def _force(s: Signals, k: Knots, waves: Array) -> Family:
+    f = Family("force")
+    for wave in waves:
+        f.add("frequency", force=wave)
+    way = s.direction
+    for tent in tents(s.velocity, k.velocity):
+        f.add("velocity", force=tent)
+    f.add("direction", force=way)
+    for tent in tents(s.position, k.position):
+        f.add("position", force=tent)
+        f.add("position", force=tent * way)
+    for tent in tents(s.time, k.time):
+        for by in (np.ones_like(way), way, s.velocity):
+            f.add("time", force=tent * by)
+    if s.hydraulic:
+        for tent in tents(s.load_pressure, k.load):
+            f.add("load_pressure", force=tent * way)
+        f.add("load_pressure", force=s.load_pressure)
+        f.add("load_pressure", force=(s.pressure_a + s.pressure_b) * way)
+    f.add("acceleration", force=s.path.acceleration)
+    for frequency in _RESONANCES:
+        follow = _resonance(s.path.acceleration, frequency, s.dt)
+        f.add("frequency", force=follow)
+        f.add("frequency", force=np.gradient(follow))
+    for gap in _GAPS:
+        f.add("reversal", force=(s.position - play(s.position, 0.5 * gap)) / gap)
+    reach = float(np.abs(s.position).max()) or 1.0
+    near = np.maximum(np.abs(s.position) / reach - 0.7, 0.0) / 0.3
+    outward = np.maximum(np.sign(s.position) * s.velocity, 0.0)
+    for power in (0, 1, 2):
+        f.add("position", force=np.sign(s.position) * near * outward**power)
+    return f
+
+
+def _opened(s: Signals, family: Family, spool: bool) -> Callable[[str, Array], None]:
+    """Adds a change of opening: in the flows, or where the spool is measured in the spool."""
+    gain_a, gain_b = s.opening_gains()
+
+    def add(variable: str, change: Array) -> None:
+        family.add(variable, flow_a=gain_a * change, flow_b=gain_b * change)
+        if spool:
+            family.add(variable, spool=change)
+
+    return add
+
+
+def _valve(s: Signals, k: Knots, waves: Array, spool: bool) -> Family:
+    f = Family("valve")
+    add = _opened(s, f, spool)
+    demand = s.drive
+    for wave in waves:
+        add("frequency", wave)
+    for tent in tents(demand, k.drive):
+        add("opening", tent)
+    for lag in LAGS:
+        add("history", shifted(demand, max(1, int(round(lag / s.dt)))) - demand)
+    for width in _WIDTHS:
+        add("history", play(demand, width) - demand)
+    for rate in _RATES:
+        add("history", rate_limited(demand, rate * s.dt) - demand)
+    for tent in tents(s.time, k.time):
+        add("time", tent)
+        add("time", tent * demand)
+    centre_a, centre_b = s.centre_gains()
+    for width in (*_WIDTHS, 0.1, np.inf):
+        near = np.maximum(1.0 - np.abs(demand) / width, 0.0)
+        f.add("opening", flow_a=near * centre_a, flow_b=near * centre_b)
+    return f
+
+
+def _drive(s: Signals, k: Knots) -> Family:
+    """What turns the drive into the force of a mechanical plant."""
+    f = Family("valve")
+    full = s.plant.value("drive_force") * s.plant.value("drive_limit")
+    for tent in tents(s.drive, k.drive):
+        f.add("drive", force=-full * tent)
+    for lag in LAGS:
+        f.add("history", force=full * (s.drive - shifted(s.drive, max(1, int(round(lag / s.dt))))))
+    for width in _WIDTHS:
+        f.add("history", force=full * (s.drive - play(s.drive, width)))
+    return f
+
+
+def _flow(s: Signals, k: Knots) -> Family:
+    f = Family("flow")
+    load, none = s.load_pressure, np.zeros_like(s.time)
+
+    def leak(variable: str, flow: Array) -> None:
+        f.add(variable, flow_a=-flow, flow_b=flow)
+
+    for tent in tents(load, k.leak_load):
+        leak("load_pressure", tent)
+    leak("load_pressure", load)
+    leak("load_pressure", np.sign(load) * np.sqrt(np.abs(load)))
+    for tent in tents(s.position, k.leak_position):
+        leak("position", tent * load)
+    for tent in tents(s.time, k.time):
+        leak("time", tent * load)
+    for p, side in ((s.pressure_a, "flow_a"), (s.pressure_b, "flow_b")):
+        for shape in (none + 1.0, p, np.sqrt(np.maximum(p, 0.0))):
+            f.add("pressure", **{side: -shape})
+    return f
+
+
+def _fluid(s: Signals, k: Knots) -> Family:
+    f = Family("fluid")
+    stored_a, stored_b = -s.capacity_a * s.path.rate_a, -s.capacity_b * s.path.rate_b
+    for in_a, in_b in zip(tents(s.pressure_a, k.pressure), tents(s.pressure_b, k.pressure), strict=True):
+        f.add("pressure", flow_a=in_a * stored_a, flow_b=in_b * stored_b)
+    for power in (1, 2):
+        thin_a, thin_b = (np.maximum(p, 1e5) ** -power for p in (s.pressure_a, s.pressure_b))
+        f.add("pressure", flow_a=thin_a * stored_a, flow_b=thin_b * stored_b)
+    f.add("rate", flow_a=-s.path.rate_a, flow_b=-s.path.rate_b)
+    for time in _CREEP:
+        f.add("history", flow_a=-lagged(s.path.rate_a, s.dt, time), flow_b=-lagged(s.path.rate_b, s.dt, time))
+    f.add("rate", flow_a=-s.path.rate_a)
+    f.add("rate", flow_b=-s.path.rate_b)
+    model = s.plant.model
+    on = set(model.effects)
+    friction = s.plant.value("viscous_friction.coefficient") if "viscous_friction" in on else 0.0
+    leakage = s.plant.value("internal_leakage.coefficient") if "internal_leakage" in on else 0.0
+    for tent in tents(s.time, k.time):
+        f.add("time", flow_a=tent * stored_a, flow_b=tent * stored_b)
+        if friction or leakage:
+            thinner = leakage * tent * s.load_pressure
+            f.add("time", force=-friction * tent * s.velocity, flow_a=thinner, flow_b=-thinner)
+    return f
+
+
+def _supply(s: Signals, k: Knots, waves: Array, measured: bool) -> Family:
+    f = Family("supply")
+    supply_a, supply_b = s.supply_gains()
+    tank_a, tank_b = s.tank_gains()
+    drawn = np.maximum(np.maximum(s.flow_a, s.flow_b), 0.0)
+    returned = np.maximum(np.maximum(-s.flow_a, -s.flow_b), 0.0)
+
+    def add(variable: str, by_drawn: Array, by_returned: Array | None = None) -> None:
+        f.add(variable, flow_a=supply_a * by_drawn, flow_b=supply_b * by_drawn)
+        if measured:
+            f.add(variable, supply=by_drawn)
+        other = by_drawn if by_returned is None else by_returned
+        f.add(variable, flow_a=tank_a * other, flow_b=tank_b * other)
+
+    for tent in tents(s.time, k.time):
+        add("time", tent)
+    for wave in waves:
+        add("frequency", wave)
+    add("flow", drawn, returned)
+    add("flow", drawn**2, returned**2)
+    for time in _SUPPLY_LAGS:
+        add("flow", lagged(drawn, s.dt, time), lagged(returned, s.dt, time))
+    return f
+
+
+def _sensor(s: Signals, k: Knots, waves: Array) -> Family:
+    f = Family("sensor")
+    mass = s.plant.value("moving_mass")
+    area_a = s.plant.value("piston_area_a") if s.hydraulic else 0.0
+    area_b = s.plant.value("piston_area_b") if s.hydraulic else 0.0
+
+    def add(variable: str, rate: Array, change: Array) -> None:
+        """An error of the position whose derivatives are ``rate`` and ``change``."""
+        f.add(variable, force=mass * change, flow_a=area_a * rate, flow_b=-area_b * rate)
+
+    for tent in tents(s.position, k.position):
+        add("position", tent * s.path.velocity, tent * s.path.acceleration)
+    for wave in waves:
+        rate = np.gradient(wave, s.dt)
+        add("frequency", rate, np.gradient(rate, s.dt))
+    add("acceleration", s.path.acceleration, s.path.jerk)
+    add("acceleration", s.path.jerk, np.gradient(s.path.jerk, s.dt))
+    for frequency in _RESONANCES:
+        sway = _resonance(s.path.acceleration, frequency, s.dt)
+        rate = np.gradient(sway, s.dt)
+        change = np.gradient(rate, s.dt)
+        add("frequency", rate, change)
+        add("frequency", change, np.gradient(change, s.dt))
+    for gap in _GAPS:
+        within = np.abs(s.position - play(s.position, 0.5 * gap)) < 0.499 * gap
+        add("reversal", within * s.path.velocity, within * s.path.acceleration)
+    for tent in tents(s.time, k.time):
+        add("time", tent, np.zeros_like(tent))
+    if s.hydraulic:
+        _pressure_sensors(s, f, area_a, area_b)
+    return f
+
+
+def _pressure_sensors(s: Signals, f: Family, area_a: float, area_b: float) -> None:
+    supply_a, supply_b = s.supply_gains()
+    tank_a, tank_b = s.tank_gains()
+    sides = (
+        ("flow_a", -area_a, s.pressure_a, s.path.rate_a, s.capacity_a, supply_a + tank_a),
+        ("flow_b", area_b, s.pressure_b, s.path.rate_b, s.capacity_b, supply_b + tank_b),
+    )
+    still = np.zeros_like(s.time)
+    for flow, area, pressure, rate, capacity, slope in sides:
+        # A reading too high asks for less force, shows a faster rise, and lets the lands give less.
+        for error, change in ((still + 1.0, still), (pressure, rate), (rate, np.gradient(rate, s.dt))):
+            f.add("pressure", force=area * error, **{flow: capacity * change + slope * error})
+
+
+def _resonance(signal: Array, frequency: float, dt: float) -> Array:
+    """What a second mass on a lightly damped spring of this frequency does in answer (static gain 1)."""
+    from scipy.signal import lfilter
+
+    turn = 2.0 * np.pi * frequency * dt
+    poles = [1.0, -2.0 * np.exp(-0.1 * turn) * np.cos(turn), np.exp(-0.2 * turn)]
+    return lfilter([sum(poles)], poles, signal)
