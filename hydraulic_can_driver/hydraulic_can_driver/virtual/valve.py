@@ -81,7 +81,7 @@ class Valve(Device):
         elif index == 0x1016:
             self.master.expect_heartbeat(self.get(0x1016, 1))
         elif index == 0x6040 and not self.operational and self.powered:
-            self._advance()
+            self._cycle(0.0)
 
     def refuse(self, index: int, sub: int, value: int) -> int:
         """Set-points and control words of the bus are not for local mode."""
@@ -135,7 +135,7 @@ class Valve(Device):
         self.master.forget()
         self.set(0x6040, 0, 0)
         self.set(0x6300, 1, 0)
-        self._advance()
+        self._cycle(0.0)
 
     def entered_operational(self) -> None:
         """From now on silence of SYNC counts."""
@@ -158,8 +158,7 @@ class Valve(Device):
 
     def _cycle(self, dt: float) -> None:
         self._advance()
-        state = self.machine.state
-        if state is State.ACTIVE and self.get(0x6042) == _BUS_MODE:
+        if self.machine.state is State.ACTIVE and self.get(0x6042) == _BUS_MODE:
             self.opening = self.amplifier.opening(self.get(0x6300, 1) / FULL, dt)
         else:
             self._rest()
