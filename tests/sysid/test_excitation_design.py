@@ -75,7 +75,8 @@ def test_the_amplitude_is_the_largest_within_the_limits(model, name: str, wish: 
     used = limits.used(sized.rehearsal, 0.0)
     assert max(used.values()) == used[binds] <= 1.0
     assert used[binds] > 0.97
-    more = rehearse(replace(sized.plan, signal=sized.plan.signal.scaled(1.15)), Plant(model))
+    larger = replace(sized.plan, signal=sized.plan.signal.scaled(1.15), amplitude_limit=10.0)
+    more = rehearse(larger, Plant(model))
     assert limits.used(more, 0.0)[binds] > 1.0
 
 

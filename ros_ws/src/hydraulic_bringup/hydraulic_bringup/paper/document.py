@@ -139,6 +139,7 @@ def document(
         "reviewed": [
             {"authors": a, "excitation": e, "model": m, "best_fit": list(f)} for a, e, m, f in printed.REVIEWED
         ],
+        "better": min((r for r in thesis if r["band"] == "in"), key=lambda r: r["rmse"])["excitation"],
         "printed": {"rmse_order": printed.RMSE_ORDER, "better": printed.BETTER},
         "left_out": list(printed.LEFT_OUT),
         "control": None,

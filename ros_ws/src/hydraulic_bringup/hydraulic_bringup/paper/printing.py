@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -15,12 +16,13 @@ def show(result: dict[str, Any], console: Console) -> None:
     _models(result, console)
     _thesis(result, console)
     _grid(result, console)
+    _control(result, console)
     console.print(result["verdict"]["text"])
 
 
 def _models(result: dict[str, Any], console: Console) -> None:
     table = Table(title="models (the paper's figures in brackets)", title_justify="left")
-    for title in ("excitation", "model", "best fit, held out", "MSE [mm²]", "FPE [mm²]"):
+    for title in ("excitation", "model", "best fit, held out", "MSE, mm²", "FPE, mm²"):
         table.add_column(title, justify="left" if title in ("excitation", "model") else "right")
     for r in result["models"]:
         table.add_row(
@@ -38,7 +40,7 @@ def _models(result: dict[str, Any], console: Console) -> None:
 
 def _thesis(result: dict[str, Any], console: Console) -> None:
     table = Table(title="the thesis: excitation over the bandwidth", title_justify="left")
-    for title in ("excitation", "band", "best fit in the paper's band", "RMSE over the grid [mm]"):
+    for title in ("excitation", "band", "best fit in the paper's band", "RMSE over the grid, mm"):
         table.add_column(title, justify="left" if title == "excitation" else "right")
     for r in result["thesis"]["rows"]:
         low, high = r["band_over_bandwidth"]
@@ -50,15 +52,34 @@ def _thesis(result: dict[str, Any], console: Console) -> None:
 
 def _grid(result: dict[str, Any], console: Console) -> None:
     names = [r["name"] for r in result["thesis"]["rows"]]
-    table = Table(title="RMSE against the nonlinear plant [mm]", title_justify="left")
-    for title in ("signal", "V", "Hz", *names):
-        table.add_column(title.replace("_", " "), justify="left" if title == "signal" else "right")
+    title = "RMSE against the nonlinear plant, mm; in the last rows against records"
+    table = Table(title=title, title_justify="left", box=box.SIMPLE, padding=(0, 1, 0, 0))
+    for name in ("signal", "V", "Hz", *names):
+        table.add_column(name.replace("_", "\n"), justify="left" if name == "signal" else "right", no_wrap=True)
     for cell in result["grid"]:
         values = [_mm(cell["models"][name]["rmse"]) for name in names]
         table.add_row(cell["shape"], number(cell["amplitude"]), number(cell["frequency"]), *values)
     for row in result["recorded"]:
         values = [_mm(row["models"][name]["rmse"]) if name in row["models"] else "" for name in names]
-        table.add_row(row["name"].replace("validation_", "recorded "), "", "", *values)
+        table.add_row(row["name"].removeprefix("validation_"), "", "rec.", *values)
+    console.print(table)
+
+
+def _control(result: dict[str, Any], console: Console) -> None:
+    if result["control"] is None:
+        return
+    table = Table(
+        title=f"step of {1e3 * result['control']['step']:g} mm with NPID (the paper's figures in brackets)",
+        title_justify="left",
+    )
+    for title in ("plant", "rise time, s", "settling time, s", "overshoot, %"):
+        table.add_column(title, justify="left" if title == "plant" else "right")
+    for row in result["control"]["rows"]:
+        figures = (
+            f"{'–' if row[key] is None else format(row[key], '.3g')} ({row['printed'][key]:g})"
+            for key in ("rise_time", "settling_time", "overshoot")
+        )
+        table.add_row(row["where"], *figures)
     console.print(table)
 
 

@@ -20,10 +20,11 @@ from rich.console import Console
 
 from hydraulic_bringup.demo import online
 from hydraulic_bringup.demo.errors import DemoError
-from hydraulic_bringup.paper import playing, study
+from hydraulic_bringup.paper import control, playing, study
 from hydraulic_bringup.paper.document import document
 from hydraulic_bringup.paper.printing import show
 from hydraulic_bringup.verbs.demo import ProgressSteps, new_folder
+from hydraulic_control.errors import HydraulicControlError
 from hydraulic_sim.errors import HydraulicSimError
 from hydraulic_sim.model_file import load_model, presets
 from hydraulic_sim.plant import Plant
@@ -63,7 +64,7 @@ def _guarded(options: argparse.Namespace, console: Console) -> int:
     except IdentificationError as error:
         print(f"\npaper failed at step 'identify': {error}", file=sys.stderr)
         return 1
-    except (HydraulicSimError, HydraulicSysidError, OSError) as error:
+    except (HydraulicSimError, HydraulicSysidError, HydraulicControlError, OSError) as error:
         print(f"paper: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -117,7 +118,7 @@ def _run(options: argparse.Namespace, console: Console) -> int:
         records |= playing.on_the_model(rest, model, steps)
         origins |= {plan.name: "rehearsed on the model" for plan in rest}
         steps.done()
-        result = _analyse(model, bandwidth, made, extra, records, origins, steps)
+        result = _analyse(model, bandwidth, made, extra, records, origins, out, steps)
         results.write_result(out, result)
         page = write_page(out, results.read_folder(out))
     show(result, console)
@@ -139,6 +140,7 @@ def _analyse(
     extra: list[Plan],
     records: dict[str, Record],
     origins: dict[str, str],
+    out: Path,
     steps: Any,
 ) -> dict[str, Any]:
     steps.begin("identify", 5.0)
@@ -161,6 +163,9 @@ def _analyse(
             steps.say(f"bandwidth not measured: {error}")
     shapes = [_signal_part(plan, records[plan.name]) for plan in extra if plan.name != "probe"]
     result = document(model.name, Plant(model), bandwidth, measured, found, records, origins, shapes, not_fitted)
+    steps.done()
+    steps.begin("control", 10.0)
+    result["control"] = control.evaluate(model, control.save_models(found, out))
     steps.done()
     return result
 
