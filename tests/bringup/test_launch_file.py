@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from hydraulic_bringup.demo import online
+from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_interfaces import contract
 from hydraulic_sim.model_file import load_model
 
@@ -42,13 +43,15 @@ def test_arguments_are_described_and_have_defaults() -> None:
     arguments = constant("ARGUMENTS")
     names = [name for name, _, _ in arguments]
     assert names == [
-        "plant", "model", "params", "enable", "record", "experiment", "controller", "gains", "reference", "estimate",
+        "plant", "model", "bus", "interface", "channel", "params", "enable", "record", "experiment", "controller",
+        "gains", "reference", "estimate",
     ]  # fmt: skip
     assert all(isinstance(default, str) and text for _, default, text in arguments)
     defaults = {name: default for name, default, _ in arguments}
     assert defaults["plant"] in constant("PLANTS")
     assert defaults["enable"] == "false"  # nothing moves without being asked for
     load_model(defaults["model"])
+    load_bus(defaults["bus"])
 
 
 def test_both_plants_are_those_of_the_demo() -> None:
@@ -56,8 +59,9 @@ def test_both_plants_are_those_of_the_demo() -> None:
     assert plants == online.PLANTS
 
 
-def test_the_simulated_plant_is_an_executable() -> None:
-    package, executable = constant("PLANTS")["sim"]
+@pytest.mark.parametrize("plant", ["sim", "can"])
+def test_the_plants_are_executables(plant: str) -> None:
+    package, executable = constant("PLANTS")[plant]
     assert (ROOT / "ros_ws/src" / package / package / "nodes" / f"{executable}.py").is_file()
 
 
@@ -85,6 +89,7 @@ def test_the_laws_are_those_of_the_controller() -> None:
 
 def test_parameters_that_are_set_are_declared() -> None:
     pytest.importorskip("rclpy")
+    from hydraulic_can_driver.nodes import can_driver
     from hydraulic_control.nodes import controller, reference
     from hydraulic_interfaces.nodes import plant_node
     from hydraulic_sim.nodes import simulator
@@ -92,6 +97,7 @@ def test_parameters_that_are_set_are_declared() -> None:
 
     declared = {
         "plant": {s.name for s in (*plant_node.PARAMETERS, *simulator.PARAMETERS)},
+        "can": {s.name for s in (*plant_node.PARAMETERS, *can_driver.PARAMETERS)},
         "recorder": {s.name for s in recorder.PARAMETERS},
         "excitation": {s.name for s in excitation.PARAMETERS},
         "controller": {s.name for s in controller.PARAMETERS},
@@ -104,15 +110,25 @@ def test_parameters_that_are_set_are_declared() -> None:
         if isinstance(node, ast.Dict) and node.lineno > TREE.body[-1].lineno - 90
     ]
     settings = [found for found in keys if found and not found & set(constant("PLANTS"))]
-    assert len(settings) == 6
+    assert len(settings) == 7
     for found in settings:
         assert any(found <= names for names in declared.values()), found
-    file = yaml.safe_load((BRINGUP / "config/bench.yaml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("plant", ["sim", "can"])
+def test_parameter_files_fit_their_nodes(plant: str) -> None:
+    pytest.importorskip("rclpy")
+    from hydraulic_can_driver.nodes import can_driver
+    from hydraulic_interfaces.nodes import plant_node
+    from hydraulic_sim.nodes import simulator
+
+    own = {"sim": simulator.PARAMETERS, "can": can_driver.PARAMETERS}[plant]
+    specs = {s.name: s for s in (*plant_node.PARAMETERS, *own)}
+    file = yaml.safe_load((BRINGUP / "config" / constant("CONFIGURATIONS")[plant]).read_text(encoding="utf-8"))
     assert list(file) == [contract.absolute(contract.PLANT_NODE)]
     values = file[contract.absolute(contract.PLANT_NODE)]["ros__parameters"]
-    assert set(values) <= declared["plant"]
+    assert set(values) <= set(specs)
     assert values["watchdog"] == contract.WATCHDOG_S
-    specs = {s.name: s for s in (*plant_node.PARAMETERS, *simulator.PARAMETERS)}
     for name, value in values.items():
         # ROS takes no integer for a parameter that is a float.
         assert type(value) is type(specs[name].default), name

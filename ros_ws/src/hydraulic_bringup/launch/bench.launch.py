@@ -2,6 +2,7 @@
 
     ros2 launch hydraulic_bringup bench.launch.py plant:=sim
     ros2 launch hydraulic_bringup bench.launch.py plant:=sim record:=/tmp/bag experiment:=chirp
+    ros2 launch hydraulic_bringup bench.launch.py plant:=can bus:=my_bench.yaml record:=/tmp/bag experiment:=chirp
     ros2 launch hydraulic_bringup bench.launch.py plant:=sim enable:=true controller:=npid reference:=staircase
 
 The plant is configured and activated; it moves nothing until `enable` is called (or enable:=true is given).
@@ -20,11 +21,15 @@ from launch import LaunchDescription
 
 CONTROLLERS = ("npid", "pid", "pole_placement")
 PLANTS = {"sim": ("hydraulic_sim", "simulator"), "can": ("hydraulic_can_driver", "can_driver")}
+CONFIGURATIONS = {"sim": "bench.yaml", "can": "can.yaml"}
 
 ARGUMENTS = (
     ("plant", "sim", "what serves the topics: sim (simulated actuator) or can (CAN driver)"),
     ("model", "moog_mcr_m_1002_bench", "model file or preset of the simulated actuator"),
-    ("params", "", "parameter file (default: config/bench.yaml of this package)"),
+    ("bus", "bench", "bus file, or a shipped one, of the CAN driver"),
+    ("interface", "", "python-can interface of the CAN driver; empty: that of the bus file"),
+    ("channel", "", "channel of that interface, such as can0; empty: that of the bus file"),
+    ("params", "", "parameter file (default: config/bench.yaml or config/can.yaml of this package)"),
     ("enable", "false", "let commands through as soon as the plant is active"),
     ("record", "", "folder of a new bag; empty: nothing is recorded"),
     ("experiment", "", "excitation plan (file or shipped name) to play; empty: none"),
@@ -46,10 +51,13 @@ def _nodes(context, *_args, **_kwargs):
     if value["plant"] not in PLANTS:
         raise RuntimeError(f"plant:={value['plant']}: allowed are {', '.join(PLANTS)}")
     package, executable = PLANTS[value["plant"]]
-    file = value["params"] or PathJoinSubstitution([FindPackageShare("hydraulic_bringup"), "config", "bench.yaml"])
+    shipped = [FindPackageShare("hydraulic_bringup"), "config", CONFIGURATIONS[value["plant"]]]
+    file = value["params"] or PathJoinSubstitution(shipped)
     settings = {"enable_on_activate": value["enable"].lower() in ("true", "1", "yes")}
     if value["plant"] == "sim":
         settings["model"] = value["model"]
+    else:
+        settings |= {"bus": value["bus"], "interface": value["interface"], "channel": value["channel"]}
     plant = LifecycleNode(
         package=package,
         executable=executable,
