@@ -19,8 +19,8 @@ from hydraulic_sim.model import Model
 
 FREQUENCIES = (5.0, 10.0, 20.0, 40.0)  # rad/s, of the poles that rules place
 SEED = 1  # of the plants that gains are tuned on: not those that `evaluate` judges them on
-SHAPES = ({"k1": 3.0, "k2": 50.0}, {"k1": 0.5, "k2": 50.0}, {"k1": 0.02, "k2": 50.0})
-"""Of the nonlinear gain: the paper's, a mild one, and hardly any."""
+SHAPES = ({"k1": 3.0, "k2": 50.0}, {"k1": 0.3, "k2": 50.0})
+"""Of the nonlinear gain: the paper's, and a mild one."""
 _FORCE_START = 1e-5  # V/N
 
 
@@ -97,8 +97,8 @@ def tune(
 ) -> Tuned:
     """The law's values, optimised from the best start that the rules give.
 
-    NPID begins where the best PID ends, if that is better: a PID is an NPID with k = 1, and a comparison of the two is
-    to be one of the laws, not of where the search got to.
+    NPID is searched for from the best PID as well: a PID is an NPID with k = 1, and a comparison of both is to be one
+    of the laws, not of where a search got to.
     """
     cases: list[Case] = [nominal(model, noise), *scattered(model, plants, SEED, noise), *identified(models)]
     duration = 2.5 * max(criteria.settling, criteria.rise) + 0.3
@@ -109,11 +109,17 @@ def tune(
         free = [name for name in FREE[kind] if force or name != "force_feedback"]
         return optimise(begin, cases, steps, criteria, free, duration, trials)
 
-    candidates = starts(law, gains, simple, force)
-    if law == "npid":
-        linear = search("pid", starts("pid", gains, simple, force))
-        candidates += [linear.values | {"controller": "npid"} | shape for shape in SHAPES]
-    return search(law, candidates)
+    found = search(law, starts(law, gains, simple, force))
+    if law != "npid":
+        return found
+    linear = search("pid", starts("pid", gains, simple, force)).values
+    softened = [linear | {"controller": "npid"} | _shaped(linear, shape) for shape in SHAPES]
+    return min(found, search("npid", softened), key=lambda one: one.cost)
+
+
+def _shaped(values: Mapping[str, Any], shape: Mapping[str, float]) -> dict[str, float]:
+    """The gain's shape, and the gains divided by what it multiplies them with half way up."""
+    return {**shape, **{n: values[n] / (1.0 + 0.5 * shape["k1"]) for n in ("kp", "ki", "kd")}}
 
 
 def starts(
@@ -129,7 +135,7 @@ def starts(
     if law == "pid":
         return [common | g.as_values() for g in gains.values()]
     return [
-        common | shape | {n: v / (1.0 + 0.5 * shape["k1"]) for n, v in g.as_values().items()}
+        common | _shaped(g.as_values(), shape)
         for g in gains.values()
         for shape in SHAPES
     ]

@@ -27,7 +27,7 @@ FREE: dict[str, tuple[str, ...]] = {
 FLOOR = {"ki": 1.0, "kd": 1e-3, "force_feedback": 1e-8, "k1": 0.05, "k2": 1.0}
 """Where the search begins for a gain that starts at 0: it moves on a logarithmic scale."""
 
-_BEGIN_S = 0.05
+_BEGIN_S = 1.0  # before the step: long enough for the integral to have taken up the valve's bias
 _HOPELESS = 10.0
 _WITHIN = 0.1
 
@@ -92,7 +92,7 @@ class Tuned:
 
 
 def try_step(values: Mapping[str, Any], case: Case, step: float, duration: float) -> Response:
-    """The response to a step of ``step`` [m], which comes after a moment of rest."""
+    """The response to a step of ``step`` [m], which comes after a second of rest."""
     controller = Controller(values)
     return run(case.make(), controller, step_reference(step, at=_BEGIN_S), duration + _BEGIN_S)
 

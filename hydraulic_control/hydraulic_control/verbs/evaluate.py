@@ -59,14 +59,15 @@ def _evaluate(options: argparse.Namespace) -> None:
     bench = [_bench(Path(path)) for path in options.bench]
     noise = QUIET if options.no_noise else SensorNoise()
     results = {}
-    for name in options.gains:
+    stems = [Path(name).stem for name in options.gains]
+    for name, stem in zip(options.gains, stems, strict=True):
         values = gains_file.load(name)
         result = evaluation.evaluate(values, model, models, bench, options.step, noise)
         if options.scatter:
             result["scatter"] = evaluation.over_scatter(
                 values, model, options.scatter, SEED, options.step, noise, Criteria()
             )
-        results[name] = result
+        results[stem if stems.count(stem) == 1 else name] = result
     if options.json:
         print(json.dumps(_finite(results), ensure_ascii=False))
         return
