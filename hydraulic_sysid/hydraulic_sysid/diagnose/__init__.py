@@ -5,6 +5,7 @@
 `verdict` decides, `shape` draws what no effect explains, `document` gathers the figures.
 """
 
+from .addition import Addition, add
 from .diagnosis import Diagnosis, DiagnosisError, diagnose
 
-__all__ = ["Diagnosis", "DiagnosisError", "diagnose"]
+__all__ = ["Addition", "Diagnosis", "DiagnosisError", "add", "diagnose"]

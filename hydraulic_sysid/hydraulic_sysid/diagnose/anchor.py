@@ -86,7 +86,7 @@ class Anchor:
 
 def inner(split: Split, left: Sequence[Array], right: Sequence[Array]) -> Array:
     """Σ over the fitted pieces of left·right: (S, m, P), (S, m, Q) → (P, Q)."""
-    total = 0.0
+    total: Array = np.zeros(())
     for chosen, a, b in zip(split.fitted, left, right, strict=True):
         if chosen.any():
             total = total + np.tensordot(a[chosen], b[chosen], axes=([0, 1], [0, 1]))

@@ -92,6 +92,7 @@ def refit(anchor: Anchor, model: Model, start: Mapping[str, float], most_steps: 
             damping *= 8.0
         if not moved:
             break
+        assert again is not None
         gain = (cost - lower) / cost
         values, starts, raw, residual, cost = tried, there, again, left, lower
         damping = max(damping / 5.0, 1e-6)

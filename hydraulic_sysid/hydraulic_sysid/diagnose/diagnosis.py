@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from typing import Any
 
 from hydraulic_sim.errors import SimulationError
@@ -15,13 +16,12 @@ from hydraulic_sysid.locate import LocateError, locate
 from hydraulic_sysid.records import Record
 
 from . import verdict
-from .anchor import keys_of
 from .document import document
-from .errors import parameter_errors
+from .errors import Known, parameter_errors
 from .levels import Level
 from .lines import spectral_lines
 from .pieces import split
-from .rivals import Rival, rivals
+from .rivals import rivals
 from .search import Found, Search, Stage
 from .shape import Shape, shapes
 
@@ -76,7 +76,7 @@ def diagnose(
     say("balances")
     before, after = _balances(found.base, records), _balances(found.final, records) if found.added else None
     known = parameter_errors(found.final.anchor)
-    diagnosed = _finished(model, found, known, records, held_out)
+    diagnosed = finished(found, known, records, held_out)
     result = document(model, records, held_out, parts, settings, found, others, known, kind, curves, before, after)
     tied = {
         rival.name: next(t for t in found.rivals[name].trials if t.name == rival.name).refit.model
@@ -94,7 +94,7 @@ def _balances(stage: Stage, records: Sequence[Record]) -> dict[str, Any] | None:
         return None
 
 
-def _finished(model: Model, found: Found, known, records: Sequence[Record], held_out: Sequence[Record]) -> Model:
+def finished(found: Found, known: Mapping[str, Known], records: Sequence[Record], held_out: Sequence[Record]) -> Model:
     """The fitted model with standard errors, and one line of history for each effect that was added."""
     done = found.final.model
     for key, k in known.items():
@@ -103,6 +103,7 @@ def _finished(model: Model, found: Found, known, records: Sequence[Record], held
     before: Level = found.base.level
     for name, after in found.steps:
         done = done.with_history(
+            date=date.today().isoformat(),
             change=f"added {name}",
             records=[r.name for r in records],
             held_out=[r.name for r in held_out] or "every third stretch of each record",
@@ -112,6 +113,3 @@ def _finished(model: Model, found: Found, known, records: Sequence[Record], held
         )
         before = after
     return done
-
-
-__all__ = ["Diagnosis", "DiagnosisError", "Level", "Rival", "diagnose", "keys_of"]

@@ -85,6 +85,26 @@ def document(
     }
 
 
+def added_document(
+    model: Model, records: Sequence[Record], held_out: Sequence[Record], parts: Split, settings: Settings,
+    found: Found, known: Mapping[str, Known], confirmed: bool,
+) -> dict[str, Any]:  # fmt: skip
+    """The document of one effect added on request: the same keys, as far as they apply."""
+    whole = document(model, records, held_out, parts, settings, found, {}, known, verdict.MISSING, (), None, None)
+    before, after = found.base.level.rms_held_out, found.final.level.rms_held_out
+    name = found.added[0]
+    whole |= heading("add")
+    whole["verdict"] |= {
+        "kind": "confirmed" if confirmed else "not confirmed",
+        "level": whole["verdict"]["level"] if confirmed else "off",
+        "text": f"With {name} the residual on held-out data goes from {before:.4g} to {after:.4g} times the noise"
+        + ("." if confirmed else ": no more than chance or fitting gives; the data do not bear it out."),
+    }
+    for key in ("alternatives", "shapes", "nearest", "balances"):
+        del whole[key]
+    return whole
+
+
 def _level(at: Level) -> dict[str, float]:
     return {"fitted": at.rms_fitted, "held_out": at.rms_held_out}
 

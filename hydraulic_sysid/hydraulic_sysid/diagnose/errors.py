@@ -16,7 +16,7 @@ from scipy.stats import t as student
 
 from .anchor import Anchor, inner
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 _AT_BOUND = 1e-6
 _COVERED = 0.95
@@ -48,11 +48,11 @@ def parameter_errors(anchor: Anchor) -> dict[str, Known]:
                 scores = np.einsum("smp,sm->sp", beyond[chosen][..., loose], residual[chosen])
                 every.append(scores)
                 by_record.append(scores.sum(axis=0))
-        pieces = _clustered(inverse, np.concatenate(every))
+        pieces = _clustered(inverse, np.concatenate(every).astype(float))
         variance = np.maximum(pieces[0], np.diag(inverse))
         width = np.sqrt(variance) * pieces[1]
         if len(by_record) >= 3:
-            records = _clustered(inverse, np.array(by_record))
+            records = _clustered(inverse, np.array(by_record, dtype=float))
             width = np.maximum(width, np.sqrt(records[0]) * records[1])
             variance = np.maximum(variance, records[0])
         errors[loose], widths[loose] = np.sqrt(variance), width

@@ -8,7 +8,7 @@ from scipy.ndimage import median_filter
 
 from .anchor import Anchor
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 STANDS_OUT = 30.0  # power of a line over the median around it
 _AROUND = 201  # bins
@@ -30,7 +30,7 @@ def spectral_lines(anchor: Anchor) -> tuple[float, ...]:
         ratio = np.where(frequency > _SLOWEST, power / np.maximum(median_filter(power, _AROUND), 1e-300), 0.0)
         best = int(np.argmax(ratio))
         if ratio[best] > STANDS_OUT:
-            found.append((float(ratio[best]), _peak(frequency, power, best)))
+            found.append((float(ratio[best]), _peak(frequency, np.asarray(power, dtype=float), best)))
     distinct: list[float] = []
     for _, f in sorted(found, reverse=True):
         if all(abs(f - other) > 0.02 * other for other in distinct):

@@ -36,17 +36,18 @@ class Split:
 def split(records: Sequence[Record], held_out: Sequence[Record], plant: Plant, length: float) -> Split:
     """Cut ``records`` and ``held_out`` into pieces of ``length`` seconds. Raises `SegmentError`."""
     pieces = cut(records, plant, length) + cut(held_out, plant, length)
-    fitted = []
+    fitted: list[NDArray[np.bool_]] = []
     for i, piece in enumerate(pieces):
-        number = np.arange(len(piece.starts))
+        number: NDArray[np.int64] = np.arange(len(piece.starts), dtype=np.int64)
         if held_out:
             fitted.append(np.full(number.size, i < len(records)))
         else:  # shifted from record to record, so that not always the same phase of an experiment is held out
-            fitted.append(
-                (number // STRETCH + i) % EVERY != EVERY - 1
-                if number.size >= EVERY * STRETCH
-                else number % EVERY != EVERY - 1
-                if number.size >= EVERY
-                else np.ones(number.size, dtype=bool)
-            )
+            fitted.append(_alternate(number, i))
     return Split(pieces, fitted)
+
+
+def _alternate(number: NDArray[np.int64], shift: int) -> NDArray[np.bool_]:
+    """Which pieces of one record are fitted; a record of very few pieces is fitted whole."""
+    if number.size >= EVERY * STRETCH:
+        return (number // STRETCH + shift) % EVERY != EVERY - 1
+    return number % EVERY != EVERY - 1 if number.size >= EVERY else np.ones(number.size, dtype=bool)

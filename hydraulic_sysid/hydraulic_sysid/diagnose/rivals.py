@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import Plant
 
 from .anchor import Anchor, inner, project
@@ -65,7 +66,7 @@ def _direction(anchor: Anchor, trial: Trial) -> list[Array] | None:
     values = {**anchor.values, **{k: model.value(k) for k in trial.refit.added}}
     try:
         raw = anchor.shooting.run(Plant(model).with_parameters(values))
-    except Exception as error:  # noqa: BLE001
-        raise error
+    except SimulationError:
+        return None
     changed = [r - lin.raw for r, lin in zip(raw, anchor.linear, strict=True)]
     return [c[..., 0] for c in project(anchor.linear, [c[..., None] for c in changed])]

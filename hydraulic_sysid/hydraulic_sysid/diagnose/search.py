@@ -186,9 +186,8 @@ class Search:
             if i == len(order) - 1:
                 steps.append((name, final.level))
                 break
-            model = model.with_effect(
-                name, {k.split(".", 1)[1]: final.model.value(k) for k in final.model.keys() if k.startswith(f"{name}.")}
-            )
+            own = [k for k in final.model.keys() if k.startswith(f"{name}.")]  # noqa: SIM118, a method of the model
+            model = model.with_effect(name, {k.split(".", 1)[1]: final.model.value(k) for k in own})
             steps.append((name, self.stage(model).level))
         added[:] = order
         return steps

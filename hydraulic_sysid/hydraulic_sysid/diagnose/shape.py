@@ -23,7 +23,7 @@ from .candidates import subsystem
 from .screen import sample
 from .shapes import FILES
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 KNOTS = 9
 _RIDGE = 1e-6  # of the largest diagonal: knots that nothing visits

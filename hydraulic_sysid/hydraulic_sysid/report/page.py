@@ -16,6 +16,7 @@ from . import (
     calibrate_section,
     compare_section,
     design_section,
+    diagnose_section,
     frequency_response_section,
     greybox_section,
     identify_section,
@@ -28,10 +29,12 @@ Result = dict[str, Any]
 
 # A result's schema chooses how it is shown; a new kind of result adds its section here.
 SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
+    "hydraulic_sysid.add/1": diagnose_section.html,
     "hydraulic_sysid.bandwidth/1": bandwidth_section.html,
     "hydraulic_sysid.calibrate/1": calibrate_section.html,
     "hydraulic_sysid.compare/1": compare_section.html,
     "hydraulic_sysid.design/1": design_section.html,
+    "hydraulic_sysid.diagnose/1": diagnose_section.html,
     "hydraulic_sysid.frequency_response/1": frequency_response_section.html,
     "hydraulic_sysid.greybox/1": greybox_section.html,
     "hydraulic_sysid.identify/2": identify_section.html,

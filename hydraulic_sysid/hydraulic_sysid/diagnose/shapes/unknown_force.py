@@ -2,7 +2,8 @@
 
     F = -height*hat(z)
 
-hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides. ``over`` chooses z by its place in ("velocity", "position", "load_pressure", "mean_pressure", "opening", "time").
+hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides.
+``over`` chooses z by its place in VARIABLES.
 
 Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 """

@@ -2,7 +2,8 @@
 
     F = -height*hat(z)*direction
 
-hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides. ``over`` chooses z by its place in ("position", "speed", "size_of_load_pressure", "mean_pressure", "time").
+hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides.
+``over`` chooses z by its place in VARIABLES.
 
 Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 """
