@@ -133,8 +133,9 @@ class ArxModel:
         u = np.asarray(drive, dtype=float) - self.input_offset
         den = np.concatenate(([1.0], self.a))
         num = np.concatenate((np.zeros(self.order.nk), self.b))
-        forced = lfilter(num, den, u) + lfilter([1.0], den, np.full(u.size, self.constant))
-        forced = forced + self.output_offset
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model is told apart below
+            forced = lfilter(num, den, u) + lfilter([1.0], den, np.full(u.size, self.constant))
+            forced = forced + self.output_offset
         if output is None:
             return forced
         _, y = lengths_agree(drive, output)
