@@ -30,6 +30,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path, default=ROOT / "runs" / "diagnosis_matrix", help="folder of the outcomes")
     parser.add_argument("--again", action="store_true", help="examine benches again that were examined before")
+    parser.add_argument("--no-reference", action="store_true", help="skip the refits of the true structures (faster)")
     parser.add_argument("--report-only", action="store_true", help="examine nothing, report what is in the folder")
     parser.add_argument("--doc", action="store_true", help=f"write {PAGE.relative_to(ROOT)}")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the benches instead of diagnosing them")
@@ -40,7 +41,7 @@ def main(argv: list[str] | None = None) -> int:
             print(benches.write(bench, options.write))
         return 0
     if not options.report_only:
-        matrix.run(chosen, options.out, options.processes, options.again)
+        matrix.run(chosen, options.out, options.processes, options.again, not options.no_reference)
     found = matrix.gather(chosen, options.out)
     if not found:
         print("nothing was examined yet")

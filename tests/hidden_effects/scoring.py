@@ -1,6 +1,6 @@
 """How a diagnosis is judged: one verdict against one answer, and rates with their uncertainty over many.
 
-Knows the schema of a diagnosis (`verdict`, `effects`, `alternatives`, `subsystem`) and nothing of how it was made.
+Knows the schema of a diagnosis (its `verdict`, its ranked `effects`) and nothing of how it was made.
 """
 
 from __future__ import annotations
@@ -18,17 +18,18 @@ def named(result: dict[str, Any]) -> list[str]:
     """Effects that the diagnosis says are there, the strongest first; none unless it says that some are missing."""
     if result["verdict"]["kind"] not in (MISSING, TIE):
         return []
-    return [e["name"] for e in sorted(result["effects"], key=lambda e: e["rank"])]
+    return [e["name"] for e in _ranked(result) if e["found"]]
+
+
+def _ranked(result: dict[str, Any]) -> list[dict[str, Any]]:
+    return sorted(result["effects"], key=lambda e: e["rank"])
 
 
 def shortlist(result: dict[str, Any]) -> list[str]:
-    """The first three names: those it says are there, then the alternatives (declared ties among them)."""
-    names = named(result)
-    for entry in result.get("alternatives") or []:
-        found = entry if isinstance(entry, str) else entry["name"]
-        if found not in names:
-            names.append(found)
-    return names[:3]
+    """The first three names by rank, of a diagnosis that says that something is missing."""
+    if result["verdict"]["kind"] not in (MISSING, TIE):
+        return []
+    return [e["name"] for e in _ranked(result)[:3]]
 
 
 def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
@@ -56,7 +57,7 @@ def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
         marks["one_found"] = bool(set(true) & set(names))
     elif answer["kind"] == "unknown":
         marks["said_so"] = kind == OUTSIDE
-        marks["right_subsystem"] = result.get("subsystem") in answer["subsystems_as_good"][0]
+        marks["right_subsystem"] = result["verdict"]["subsystem"] in answer["subsystems_as_good"][0]
     if answer["kind"] in ("single", "pair"):
         marks["parameters"] = parameters(answer, result)
     return marks
@@ -67,8 +68,9 @@ def parameters(answer: dict[str, Any], result: dict[str, Any]) -> list[dict[str,
     truth from the null value, and whether the 95 % interval covers. Parameters without a finite standard error
     count as not identifiable and are left out."""
     rows = []
-    for effect in result["effects"] if named(result) else []:
-        truth = answer["hidden"].get(effect["name"], {})
+    names = named(result)
+    for effect in result["effects"]:
+        truth = answer["hidden"].get(effect["name"], {}) if effect["name"] in names else {}
         for p in effect["parameters"]:
             key = p["key"].rpartition(".")[2]
             if key not in truth or not _known(p):

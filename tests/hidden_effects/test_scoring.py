@@ -19,22 +19,18 @@ def effect(name: str, rank: int = 1, **parameters: tuple[float, float]) -> dict[
         {"key": f"{name}.{k}", "value": v, "standard_error": e, "interval": [v - 1.96 * e, v + 1.96 * e], "unit": "1"}
         for k, (v, e) in parameters.items()
     ]
-    return {"name": name, "rank": rank, "parameters": rows}
+    return {"name": name, "rank": rank, "found": True, "parameters": rows}
 
 
-def said(kind: str, *effects: dict[str, Any], alternatives: tuple[str, ...] = (), subsystem: str | None = None):
-    return {
-        "verdict": {"kind": kind, "text": ""},
-        "effects": list(effects),
-        "alternatives": [{"name": n} for n in alternatives],
-        "subsystem": subsystem,
-    }
+def said(kind: str, *effects: dict[str, Any], others: tuple[str, ...] = (), subsystem: str | None = None):
+    tried = [{"name": n, "rank": 10 + i, "found": False, "parameters": []} for i, n in enumerate(others)]
+    return {"verdict": {"kind": kind, "text": "", "subsystem": subsystem}, "effects": [*effects, *tried]}
 
 
 def test_the_right_name_counts_first_only_as_missing():
     right = scoring.judge(DEADBAND, said("missing", effect("valve_deadband")))
     assert right["right_first"] and right["first_three"] and right["nothing_beside"]
-    tie = scoring.judge(DEADBAND, said(scoring.TIE, effect("valve_deadband"), alternatives=("backlash",)))
+    tie = scoring.judge(DEADBAND, said(scoring.TIE, effect("valve_deadband"), others=("backlash",)))
     assert not tie["right_first"] and tie["first_three"]
 
 
@@ -42,7 +38,7 @@ def test_rank_decides_not_order_and_the_fourth_is_too_late():
     second = said("missing", effect("valve_deadband", 2), effect("backlash", 1))
     marks = scoring.judge(DEADBAND, second)
     assert not marks["right_first"] and marks["first_three"] and not marks["nothing_beside"]
-    late = said("missing", effect("backlash"), alternatives=("presliding", "sensor_lag", "valve_deadband"))
+    late = said("missing", effect("backlash"), others=("presliding", "sensor_lag", "valve_deadband"))
     assert not scoring.judge(DEADBAND, late)["first_three"]
 
 
@@ -99,7 +95,7 @@ def test_selection_and_page(tmp_path):
     bench = benches.Bench("single", ("valve_deadband",), "mild", 1)
     width = bench.truth()["valve_deadband"]["width"]
     marks = scoring.judge(bench.answer(), said("missing", effect("valve_deadband", width=(width, 1e-4))))
-    page = matrix.document([{"marks": marks, "seconds": 12.0}], "the command")
+    page = matrix.document([{"marks": marks, "cpu_seconds": 12.0, "peak_MiB": 300.0}], "the command")
     assert "    the command" in page and "| valve_deadband | 1 | valve_deadband |" in page
     assert "| one hidden effect: right name first | ≥ 90 % | 1/1 = 100 % | 21…100 % |" in page
     assert matrix.gather([bench], tmp_path) == []
