@@ -61,11 +61,8 @@ class Bench:
         self._looping = False
         self._next_heartbeat = 0.0
         self.master = Master(bus, self.receiver, interface, channel)
-        self.beat: Beat = (
-            KernelBeat(self.master, self.frames, round(1e9 * self._period))
-            if kernel
-            else LoopBeat(self.master, self.frames)
-        )
+        beat = KernelBeat if kernel else LoopBeat
+        self.beat: Beat = beat(self.master, self.frames, round(1e9 * self._period))
 
     def boot(self) -> None:
         """Check who is there, set the valve to 0 and off, boot and map all devices, read back what they are set to.
@@ -129,7 +126,7 @@ class Bench:
         """One SYNC of the running loop: send the drive [V], give the sample; None if not all frames came in time."""
         self._looping = True
         self.supervision.check(time.monotonic())
-        complete, frame = self._exchange(drive)
+        complete, frame = self._exchange(drive, stamp_ns)
         self.supervision.cycle(stamp_ns, complete)
         with self._changed:
             self._hear_valve()
@@ -198,7 +195,7 @@ class Bench:
         """What is wrong while the bench runs."""
         return self.faults.text
 
-    def _exchange(self, drive: float) -> tuple[bool, bytes]:
+    def _exchange(self, drive: float, sync_ns: int) -> tuple[bool, bytes]:
         """Send drive and SYNC; whether all frames came, and the frame that was sent."""
         with self._changed:
             problem = self.faults.text
@@ -211,7 +208,7 @@ class Bench:
             if self._looping and now >= self._next_heartbeat:
                 self._next_heartbeat = now + self.bus.master.heartbeat
                 self.master.send(HEARTBEAT + self.bus.master.id, bytes([OPERATIONAL]))
-            in_time = self.beat.exchange(self.bus.drive_pdo.cob_id, frame)
+            in_time = self.beat.exchange(self.bus.drive_pdo.cob_id, frame, sync_ns)
         except BusDownError as error:
             self.faults.report(Fault.BUS, str(error))
             in_time = False
@@ -235,7 +232,7 @@ class Bench:
         end = due = time.monotonic()
         end += patience
         while not done() and due < end:
-            complete, frame = self._exchange(0.0)
+            complete, frame = self._exchange(0.0, time.time_ns())
             with self._changed:
                 self._hear_valve()
                 if complete:

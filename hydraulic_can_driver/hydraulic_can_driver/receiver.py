@@ -16,6 +16,7 @@ from hydraulic_can_driver.bus import Bus, Node
 from hydraulic_can_driver.can_bus import hears_itself
 from hydraulic_can_driver.faults import Fault, FaultLatch
 from hydraulic_can_driver.frames import Frames
+from hydraulic_interfaces.pacing import request_realtime
 
 SYNC, NMT, EMERGENCY, SDO_ANSWER, SDO_QUESTION, HEARTBEAT = 0x080, 0x000, 0x080, 0x580, 0x600, 0x700
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0, 4, 5, 127
@@ -31,6 +32,7 @@ class Receiver(can.Listener):
 
     `heard[node]` is when a heartbeat of the node came (monotonic, s), `states[node]` the NMT state it told. While
     `watching`, a node that restarts or leaves OPERATIONAL is a fault, as is a frame that only the driver may send.
+    Where a `priority` is set, the receiving thread asks for it with the next frame.
     """
 
     def __init__(self, bus: Bus, frames: Frames, faults: FaultLatch, interface: str, kernel_sync: bool = False) -> None:
@@ -40,6 +42,7 @@ class Receiver(can.Listener):
         self.states: dict[str, int] = {}
         self.emergencies: deque[str] = deque(maxlen=20)
         self.unexpected = 0
+        self.priority = 0
         self._echo = hears_itself(interface)
         self._outstanding: dict[int, int] = {}
         self._handlers: dict[int, Callable[[bytes], None]] = {}
@@ -59,6 +62,10 @@ class Receiver(can.Listener):
 
     def on_message_received(self, msg: can.Message) -> None:
         """Sort a frame."""
+        if self.priority:
+            # The control loop waits for this thread, which is python-can's and can only raise itself.
+            request_realtime(self.priority)
+            self.priority = 0
         if msg.is_error_frame:
             if msg.arbitration_id & _BUS_OFF:
                 self._faults.report(Fault.BUS, "the controller is bus-off: check wiring, termination and bit rate")

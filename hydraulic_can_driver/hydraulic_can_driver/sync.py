@@ -6,6 +6,7 @@ published under one stamp are therefore those of one SYNC.
 
 from __future__ import annotations
 
+import threading
 import time
 from typing import Any, Protocol
 
@@ -15,10 +16,11 @@ from hydraulic_can_driver.errors import BusDownError
 from hydraulic_can_driver.frames import Frames
 from hydraulic_can_driver.master import Master
 from hydraulic_can_driver.receiver import SYNC
+from hydraulic_interfaces.pacing import Pacer
 
 # How long before the SYNC the drive is sent, as a share of the period: the frame itself (100 us at 1 Mbit/s) and the
-# jitter of the loop must fit.
-_LEAD = 0.25
+# jitter of the loop must fit; only that of sending where the loop sends both.
+_KERNEL_LEAD, _LOOP_LEAD = 0.25, 0.15
 
 
 class Beat(Protocol):
@@ -36,17 +38,20 @@ class Beat(Protocol):
     def first_instant(self, earliest_ns: int) -> int:
         """When the first drive is to be sent, at or after `earliest_ns` of the monotonic clock."""
 
-    def exchange(self, cob_id: int, drive_frame: bytes) -> bool:
-        """Send the drive; return right after its SYNC. False if there was none, or it came before the drive."""
+    def exchange(self, cob_id: int, drive_frame: bytes, sync_ns: int) -> bool:
+        """Send the drive; return right after its SYNC, which is due at `sync_ns` (wall time).
+
+        False if there was none, or it came before the drive.
+        """
 
 
 class LoopBeat:
-    """The control loop itself sends each SYNC, right behind the drive."""
+    """The control loop itself sends each SYNC, a little after the drive and on its instant."""
 
-    lead_ns = 0
-
-    def __init__(self, master: Master, frames: Frames) -> None:
-        self._master, self._frames = master, frames
+    def __init__(self, master: Master, frames: Frames, period_ns: int) -> None:
+        self._master, self._frames, self._period_ns = master, frames, period_ns
+        self.lead_ns = round(_LOOP_LEAD * period_ns)
+        self._pacer, self._pacing_thread = Pacer(), threading.get_ident()
 
     def start(self) -> None:
         """Nothing: see `exchange`."""
@@ -58,9 +63,14 @@ class LoopBeat:
         """At once."""
         return earliest_ns
 
-    def exchange(self, cob_id: int, drive_frame: bytes) -> bool:
+    def exchange(self, cob_id: int, drive_frame: bytes, sync_ns: int) -> bool:
         """See `Beat.exchange`."""
         self._master.send(cob_id, drive_frame)
+        rest = sync_ns - time.time_ns()
+        if 0 < rest < self._period_ns:
+            if threading.get_ident() != self._pacing_thread:
+                self._pacer, self._pacing_thread = Pacer(), threading.get_ident()
+            self._pacer.wait(time.monotonic_ns() + rest)
         self._frames.begin(time.time_ns())
         self._master.send(SYNC, b"")
         return True
@@ -71,7 +81,7 @@ class KernelBeat:
 
     def __init__(self, master: Master, frames: Frames, period_ns: int) -> None:
         self._master, self._frames, self._period_ns = master, frames, period_ns
-        self.lead_ns = round(_LEAD * period_ns)
+        self.lead_ns = round(_KERNEL_LEAD * period_ns)
         self._task: Any = None
         self._seen = 0
 
@@ -99,7 +109,7 @@ class KernelBeat:
         heard = self._frames.sync_ns - time.time_ns() + time.monotonic_ns() - self.lead_ns
         return heard + -(-(earliest_ns - heard) // self._period_ns) * self._period_ns
 
-    def exchange(self, cob_id: int, drive_frame: bytes) -> bool:
+    def exchange(self, cob_id: int, drive_frame: bytes, sync_ns: int) -> bool:
         """See `Beat.exchange`."""
         in_time = self._frames.cycle == self._seen
         self._master.send(cob_id, drive_frame)

@@ -154,7 +154,7 @@ def fill(wire: Wire) -> None:
 def patient() -> Bus:
     """The shipped bus, with the patience that a loaded machine needs."""
     bus = load_bus("bench")
-    monitoring = replace(bus.monitoring, sync_gap=5.0, missed_cycles=50, state_change=5.0, heartbeats=100)
+    monitoring = replace(bus.monitoring, sync_gap=5.0, missed_cycles=50, state_change=2.0, heartbeats=100)
     return replace(bus, interface="virtual", rate=200.0, monitoring=monitoring)
 
 

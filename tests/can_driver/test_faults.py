@@ -76,6 +76,7 @@ def test_fault(name: str, rig: Callable[..., Any], wait_until: Any) -> None:
             here.bench.reset()
     assert here.devices.drive == 0.0 and {sample.drive for sample in loop.samples[latched:]} <= {0.0}
     here.devices.clear(case.upset)
+    loop.drive = 0.0
     if case.after == "reset":
         wait_until(lambda: accepted(here.bench), "a reset that is accepted")
     else:
@@ -90,9 +91,10 @@ def test_fault(name: str, rig: Callable[..., Any], wait_until: Any) -> None:
 
 
 def accepted(bench: Any) -> bool:
-    """Whether a reset is; heartbeats, frames and error registers recover a little after their cause has gone."""
+    """Whether a reset is; heartbeats, frames and positions recover a little after their cause has gone."""
     try:
         bench.reset()
+        bench.follow(State.ACTIVE)
     except DeviceError:
         return False
     return True

@@ -11,6 +11,7 @@ from hydraulic_can_driver import readback
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_can_driver.cia408 import State, describe
+from hydraulic_can_driver.sync import KernelBeat
 from hydraulic_interfaces.nodes.running import run_plant
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.plant_backend import PlantBackend
@@ -50,6 +51,8 @@ class CanPlant(PlantBackend):
             bus = replace(bus, rate=values["rate"])
         self.hardware_id = f"can: {bus.name}"
         self._bench = Bench(bus, values["interface"], values["channel"])
+        if values["realtime_priority"]:
+            self._bench.receiver.priority = min(values["realtime_priority"] + 1, 98)
         self._bench.boot()
         self._description = readback.description(bus, self._bench.readings)
         return ()
@@ -119,6 +122,7 @@ class CanPlant(PlantBackend):
         status = bench.machine.status
         return {
             "valve": "unknown" if status is None else describe(status),
+            "sync": "kernel" if isinstance(bench.beat, KernelBeat) else "control loop",
             "settings": "; ".join(readback.sentences(bench.bus, bench.readings)) or "neutral",
             **bench.supervision.report(),
         }
