@@ -57,7 +57,11 @@ REFUSED = {
     "no counts": ("counts: 1, value: 5.0e-5", "counts: 0, value: 5.0e-5", "neither may be 0"),
     "sign": ("value: 5.0e-5, unit", "value: 5.0e-5, sign: 2, unit", "sign is 2; allowed: 1, -1"),
     "boot value": ("type: i8, value: 1,", "type: i8, value: 300,", "value is 300; allowed: -128 ... 127"),
-    "type in the EDS": ("sub: 0, type: i32, counts", "sub: 0, type: f32, counts", "0x6004:0 is f32; in lvdt_406.eds it is i32"),
+    "type in the EDS": (
+        "sub: 0, type: i32, counts",
+        "sub: 0, type: f32, counts",
+        "0x6004:0 is f32; in lvdt_406.eds it is i32",
+    ),
     "object of the EDS": ("object: 0x6005, sub: 1", "object: 0x6007, sub: 1", "0x6007:1 is no object of lvdt_406.eds"),
     "EDS file": ("eds: lvdt_406.eds", "eds: lvdt_407.eds", "no EDS file 'lvdt_407.eds'"),
     "switch bits": ("limit_retracted: 2", "limit_retarded: 2", "expected ['limit_extended', 'limit_retracted']"),
