@@ -110,10 +110,12 @@ def test_lifecycle_live_gains_and_stale_states(plant: Any, node: Any, client: An
     assert client.change_state("configure", CONTROLLER)
     assert not commands, "an inactive controller says nothing"
     assert client.change_state("activate", CONTROLLER)
-    wait_until(lambda: len(commands) > 200, "commands")
-    assert all(m.header.frame_id == "controller" for m in commands[-50:])
-    answered = {from_time(m.header.stamp) for m in states}
-    assert sum(from_time(m.header.stamp) in answered for m in commands[:200]) > 190, "the stamp of its state"
+
+    def stamps(messages: list[Any]) -> set[int]:
+        return {from_time(m.header.stamp) for m in list(messages)}
+
+    wait_until(lambda: len(stamps(states) & stamps(commands)) > 100, "commands with the stamps of their states")
+    assert all(m.header.frame_id == "controller" for m in commands)
     wait_until(lambda: refer(client, reference, 0.03) or abs(states[-1].position[0] - 0.03) < 5e-4, "the goal")
     for name, value in (("kp", 150.0), ("controller", "pid"), ("ki", 0.0)):
         assert set_parameter(client, name, value).successful, name
@@ -148,19 +150,20 @@ def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(
     plant()
     node("controller", "autostart:=true", "gains:=npid", *PATIENT)
     node("reference", "autostart:=true", "kind:=sine", "amplitude:=0.05", "frequency:=0.5", "cycles:=60")
-    wait_until(lambda: int(controller_says(heard).get("answered", 0)) > 5000, "some cycles of the sine")
 
     def worst(count: int) -> float:
-        wanted = {from_time(m.header.stamp): m.position[0] for m in references[-2 * count :]}
-        errors = [m.position[0] - wanted[s] for m in states[-count:] if (s := from_time(m.header.stamp)) in wanted]
-        assert len(errors) > count // 2
-        return float(np.max(np.abs(errors)))
+        """Of the newest states whose reference has come as well: a busy test may lose some of either."""
+        wanted = {from_time(m.header.stamp): m.position[0] for m in list(references)}
+        found = [m.position[0] - wanted[s] for m in list(states) if (s := from_time(m.header.stamp)) in wanted]
+        return float(np.max(np.abs(found[-count:]))) if len(found) >= count else math.nan
 
+    # Past the approach and the first cycle, in which the sine swells.
+    wait_until(lambda: len(references) > 6000 and worst(2000) > 0.0, "a whole cycle of the sine")
     before = worst(2000)
     assert set_parameter(client, "extra_effects", effects, "/actuator/plant").successful
     wait_until(lambda: effects[1:9] in health["effects"], "the effect")
-    mark = len(states)
-    wait_until(lambda: len(states) > mark + 4000, "two more cycles")
+    mark, last = len(states), len(references)
+    wait_until(lambda: min(len(states) - mark, len(references) - last) > 4000, "two more cycles")
     after = worst(2000)
     assert before < 0.012
     assert before < after < 0.03, "it shows, and does not run away"

@@ -13,13 +13,11 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
-from hydraulic_control import gains_file
 from hydraulic_control.controller import Controller
 from hydraulic_control.nodes._controller_health import ControllerHealth
-from hydraulic_control.parameters import LAW, SPECS, check
+from hydraulic_control.nodes._controller_parameters import PARAMETERS, ControllerParameters
 from hydraulic_control.session import ControlSession
 from hydraulic_interfaces.contract import CONTROLLER_NODE, NAMESPACE
 from hydraulic_interfaces.conversions import (
@@ -29,28 +27,12 @@ from hydraulic_interfaces.conversions import (
     sample_from_messages,
 )
 from hydraulic_interfaces.nodes.guarded_lifecycle import guard_transitions
-from hydraulic_interfaces.nodes.parameters import ParameterTable
 from hydraulic_interfaces.nodes.serving import Served, serve
-from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.qos import profile
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 HEALTH_PERIOD_S = 0.5
 STATE_DEPTH = 10  # a node that cannot keep up must skip some, not fall behind
-
-SAFETY: tuple[ParameterSpec, ...] = (
-    ParameterSpec("age_limit", 0.02, "age of a state, or silence, that gives 0 V", "s", 1e-3, 1.0, live=True),
-    ParameterSpec("reference_timeout", 0.1, "age of a reference from which it stands", "s", 1e-3, 1e3, live=True),
-    ParameterSpec("travel", 0.7, "largest reference to either side", "m", 0.0, 100.0, live=True),
-    ParameterSpec("speed_limit", 20.0, "a position that leaps faster is not believed", "m/s", 0.1, 1e6, live=True),
-    ParameterSpec("applied_tolerance", 0.5, "between applied drive and commands; 0: any", "V", 0.0, 20.0, live=True),
-)
-PARAMETERS: tuple[ParameterSpec, ...] = (
-    ParameterSpec("autostart", False, "configure and activate at start"),
-    ParameterSpec("gains", "", f"parameter file of the gains, or one of {', '.join(gains_file.shipped())}; ''"),
-    *SAFETY,
-    *LAW,
-)
 
 
 class ControllerNode(Served, LifecycleNode):
@@ -60,39 +42,37 @@ class ControllerNode(Served, LifecycleNode):
         super().__init__(CONTROLLER_NODE, namespace=NAMESPACE, **options)
         guard_transitions(self)
         self._state = "unconfigured"
-        self._loaded = ""
         self._session = ControlSession(Controller())
-        self._table = ParameterTable(self, PARAMETERS, self._apply, lambda: self._state != "unconfigured")
-        for spec in (*SAFETY, *LAW):
-            self._apply(spec.name, self._table[spec.name])
+        self._settings = ControllerParameters(self, self._session, lambda: self._state != "unconfigured")
         self._health = ControllerHealth(self._session)
         self._encode = CommandEncoder(CONTROLLER_NODE)
         self._command = self.create_publisher(JointState, "command", profile("command"))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
-        self._heard = self._reported = time.monotonic()
+        self._simulated = self.get_parameter("use_sim_time").value
+        self._heard, self._reported = self._steady(), time.monotonic()
         self._stamp_ns = 0
         self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
         self.create_subscription(JointState, "reference", self._on_reference, profile("reference", STATE_DEPTH))
-        if self._table["autostart"]:
+        if self._settings.table["autostart"]:
             self._starter = self.create_timer(0.0, self._autostart)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the gains and compile the step; FAILURE with a log line if that cannot be done."""
         try:
-            self._load(self._table["gains"])
+            self._settings.load_gains()
             # Compiled, or read from numba's cache, before the first state waits for it.
             Controller(self._session.controller.values).step(1e-3, 0.0, 0.0, 0.0)
         except ValueError as error:
             self.get_logger().error(f"cannot configure: {error}")
             return FAILURE
-        self._table.warn_of_unknown()
+        self._settings.table.warn_of_unknown()
         self._state = "inactive"
         return SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Hold the position that the next state reports, until a reference comes."""
         self._session.begin()
-        self._heard, self._state = time.monotonic(), "active"
+        self._heard, self._state = self._steady(), "active"
         return SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -117,7 +97,7 @@ class ControllerNode(Served, LifecycleNode):
     def watch(self) -> None:
         """What must happen without a message: notice silence, report health."""
         now = time.monotonic()
-        if self._state == "active" and self._session.silence(age := now - self._heard):
+        if self._state == "active" and self._session.silence(age := self._steady() - self._heard):
             self._command.publish(self._encode(self._stamp_ns + round(age * 1e9), 0.0))
             self._reported = 0.0
         if now - self._reported > HEALTH_PERIOD_S:
@@ -144,7 +124,7 @@ class ControllerNode(Served, LifecycleNode):
             self._command.publish(self._encode(sample.stamp_ns, drive))
             self._stamp_ns = sample.stamp_ns
             self._health.latencies.append((clock.now().nanoseconds - sample.stamp_ns) * 1e-9)
-        self._heard = time.monotonic()
+        self._heard = self._steady()
 
     def _on_reference(self, message: JointState) -> None:
         try:
@@ -152,21 +132,9 @@ class ControllerNode(Served, LifecycleNode):
         except MessageError as error:
             self.get_logger().warning(f"not a reference: {error}", throttle_duration_sec=1.0)
 
-    def _apply(self, name: str, value: Any) -> None:
-        if name in SPECS:
-            self._session.set({name: check(name, value)})
-        else:
-            setattr(self._session, name, value)
-
-    def _load(self, gains: str) -> None:
-        """Take the gains of a file, once, where the start of the node did not say otherwise."""
-        if not gains or gains == self._loaded:
-            return
-        values = {k: v for k, v in gains_file.load(gains).items() if k not in self._parameter_overrides}
-        for result in self.set_parameters([Parameter(name, value=value) for name, value in values.items()]):
-            if not result.successful:
-                raise ValueError(result.reason)
-        self._loaded = gains
+    def _steady(self) -> float:
+        """Seconds by which silence is measured: a simulation may run slower than the wall's clock."""
+        return self.get_clock().now().nanoseconds * 1e-9 if self._simulated else time.monotonic()
 
     def _autostart(self) -> None:
         self._starter.cancel()

@@ -1,0 +1,65 @@
+"""What can be set on the controller node: the law's parameters, and when it does not answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from hydraulic_control import gains_file
+from hydraulic_control.parameters import LAW, SPECS, check
+from hydraulic_control.session import ControlSession
+from hydraulic_interfaces.nodes.parameters import ParameterTable
+from hydraulic_interfaces.parameter_spec import ParameterSpec
+
+SAFETY: tuple[ParameterSpec, ...] = (
+    ParameterSpec("age_limit", 0.02, "age of a state, or silence, that gives 0 V", "s", 1e-3, 1.0, live=True),
+    ParameterSpec("reference_timeout", 0.1, "age of a reference from which it stands", "s", 1e-3, 1e3, live=True),
+    ParameterSpec("travel", 0.7, "largest reference to either side", "m", 0.0, 100.0, live=True),
+    ParameterSpec("speed_limit", 20.0, "a position that leaps faster is not believed", "m/s", 0.1, 1e6, live=True),
+    ParameterSpec("applied_tolerance", 0.5, "between applied drive and commands; 0: any", "V", 0.0, 20.0, live=True),
+)
+PARAMETERS: tuple[ParameterSpec, ...] = (
+    ParameterSpec("autostart", False, "configure and activate at start"),
+    ParameterSpec("gains", "", f"parameter file of the gains, or one of {', '.join(gains_file.shipped())}; ''"),
+    *SAFETY,
+    *LAW,
+)
+
+
+class ControllerParameters:
+    """The node's parameters, applied to the session as they are set; `locked` as of `ParameterTable`.
+
+    :raises ValueError: a value given at the start is not acceptable.
+    """
+
+    def __init__(self, node: Node, session: ControlSession, locked: Callable[[], bool]) -> None:
+        self._node, self._session, self._loaded = node, session, ""
+        self.table = ParameterTable(node, PARAMETERS, self._apply, locked)
+        for spec in SAFETY:
+            self._apply(spec.name, self.table[spec.name])
+        session.set({spec.name: self.table[spec.name] for spec in LAW})
+
+    def load_gains(self) -> None:
+        """Take the gains of the file that is named, once, where the start of the node did not say otherwise.
+
+        :raises ValueError: the file or a value in it is not acceptable.
+        """
+        gains = self.table["gains"]
+        if not gains or gains == self._loaded:
+            return
+        given = self._node._parameter_overrides
+        values = {name: value for name, value in gains_file.load(gains).items() if name not in given}
+        self._session.set(values)  # all at once: one by one they need not go together
+        for result in self._node.set_parameters([Parameter(name, value=value) for name, value in values.items()]):
+            if not result.successful:
+                raise ValueError(result.reason)
+        self._loaded = gains
+
+    def _apply(self, name: str, value: Any) -> None:
+        if name in SPECS:
+            self._session.set({name: check(name, value)})
+        else:
+            setattr(self._session, name, value)
