@@ -30,7 +30,8 @@ IDENTIFICATION = {
     "multisine": Settings(structure=TransferFunction(TransferFunctionOrder(3, 0)), sampling_time=0.01, holdout=0.5),
 }
 """ARX(3, 3, 1) every 50 ms on the first 80 %; third-order transfer function on the first half."""
-DURATION_S, SHORT_S = 50.0, 14.0
+DURATION_S, SHORT_S = 50.0, 8.0
+SHORT_APPROACH_S = 5.0
 AMPLITUDES_V = (2.5, 5.0)
 FREQUENCIES = (0.2, 0.5, 1.0, 2.0)  # of the bandwidth
 RECORDED_V, RECORDED_FREQUENCY = 5.0, 0.5
@@ -81,6 +82,11 @@ def excitations(
             found.append(Excitation(kind, band, replace(sized, name=name)))
             tick()
     return found
+
+
+def approached(excitation: Excitation, seconds: float) -> Excitation:
+    """The same with an approach of so many seconds."""
+    return replace(excitation, plan=replace(excitation.plan, approach=seconds))
 
 
 def played(excitation: Excitation, record: Record) -> Record:

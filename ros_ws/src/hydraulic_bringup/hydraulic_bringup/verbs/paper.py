@@ -99,10 +99,11 @@ def _run(options: argparse.Namespace, console: Console) -> int:
     with ProgressSteps(console, graph_s + 60.0) as steps:
         steps.begin("bandwidth and excitations", 20.0)
         bandwidth = from_model(model)
-        made = study.excitations(model, bandwidth.position, study.DURATION_S, steps.tick)
+        bands = tuple(band for band in study.BANDS if not (options.quick and band == "in"))
+        made = study.excitations(model, bandwidth.position, study.DURATION_S, steps.tick, bands)
         if options.quick:
-            short = study.excitations(model, bandwidth.position, duration, steps.tick, bands=("in",))
-            made = [*short, *(e for e in made if e.band != "in")]
+            short = study.excitations(model, bandwidth.position, duration, steps.tick, ("in",))
+            made = [*(study.approached(e, study.SHORT_APPROACH_S) for e in short), *made]
         extra = (
             [] if options.quick else [load_plan("probe"), *study.recorded_shapes(model, bandwidth.position, _SHAPES_S)]
         )
