@@ -239,5 +239,5 @@ def test_a_bad_plan_is_refused_before_anything_runs(launch: Any, tmp_path: Path)
 def test_help_shows_the_parameters(launch: Any) -> None:
     node = launch("hydraulic_sysid.nodes.excitation", "--help")
     assert node.wait() == 0
-    for word in ("plan", "autostart", "state_timeout", "chirp, multisine, steps, triangle"):
+    for word in ("plan", "autostart", "state_timeout", "chirp, multisine, probe, steps, triangle"):
         assert word in node.output()
