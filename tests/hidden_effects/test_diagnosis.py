@@ -1,0 +1,48 @@
+"""A few benches of the catalogue, as a user would have them diagnosed (all of it: benchmarks/diagnosis_matrix.py)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hidden_effects import benches, scoring
+from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.diagnose import diagnose
+from hydraulic_sysid.records import read_all
+
+RIGHT_FIRST = (
+    benches.Bench("single", ("coulomb_friction",), "strong", 1),
+    benches.Bench("single", ("valve_deadband",), "mild", 1),
+    benches.Bench("single", ("entrained_air",), "strong", 1),
+    benches.Bench("single", ("command_delay",), "mild", 1),
+    benches.Bench("single", ("supply_droop",), "mild", 1),
+    benches.Bench("single", ("sensor_lag",), "strong", 1),
+)
+
+
+def examined(bench: benches.Bench, folder) -> dict[str, Any]:
+    place = benches.write(bench, folder)
+    model = load_model(place / "model.yaml")
+    result = diagnose(model, read_all(sorted(place.glob("*.csv.gz")))).result
+    return scoring.judge(bench.answer(), result) | {"text": result["verdict"]["text"]}
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("bench", RIGHT_FIRST, ids=lambda b: b.name)
+def test_the_hidden_effect_is_named_first(bench, tmp_path):
+    marks = examined(bench, tmp_path)
+    assert marks["right_first"], marks
+    assert marks["parameters"], marks
+
+
+@pytest.mark.timeout(600)
+def test_nothing_is_named_where_nothing_is_missing(tmp_path):
+    marks = examined(benches.Bench("none", seed=1), tmp_path)
+    assert marks["silent"], marks
+
+
+@pytest.mark.timeout(600)
+def test_what_no_library_lists_is_said_to_be_outside(tmp_path):
+    marks = examined(benches.Bench("unknown", ("worn_barrel_leakage",), "strong", 1), tmp_path)
+    assert marks["said_so"] and marks["right_subsystem"], marks
