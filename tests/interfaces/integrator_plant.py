@@ -50,6 +50,9 @@ class IntegratorPlant(PlantBackend):
         self._gain = value
         self._note(f"set {name} {value}")
 
+    def description(self) -> Mapping[str, Any]:
+        return {**super().description(), "gain": self._gain}
+
     def activate(self) -> None:
         self._note("activate")
         if self._trouble == "activate":

@@ -121,6 +121,53 @@ def test_a_stall_is_skipped_and_counted_by_a_plant_that_cannot(wait_until: Any) 
     assert all((s - stamps[0]) % PERIOD == 0 for s in stamps)
 
 
+def test_a_cycle_that_begins_too_late_is_left_out(wait_until: Any) -> None:
+    """With a share of one half, no step begins more than half a period after its instant."""
+    late: list[float] = []
+
+    class Punctual(Scripted):
+        tolerated_lateness = 0.5
+
+        def step(self, stamp_ns: int, drive: float, dt: float) -> PlantSample:
+            late.append((time.time_ns() - stamp_ns) / PERIOD)
+            return super().step(stamp_ns, drive, dt)
+
+    # A stall of 0.7 periods beyond its own: the step after it is left out, not begun late.
+    loop, ports = run(Punctual(lambda k: time.sleep(0.0017) if k % 20 == 10 else None), 200, wait_until)
+    assert loop.monitor.report().skipped >= 9
+    stamps = [s.stamp_ns for s in ports.samples]
+    assert all((s - stamps[0]) % PERIOD == 0 for s in stamps)
+    # What lies between the decision and the step (this machine may be taken away in between) is the only exception.
+    assert sorted(late)[int(0.9 * len(late))] < 0.6
+
+
+def test_a_cycle_without_a_sample_is_counted_and_publishes_nothing(wait_until: Any) -> None:
+    class Gappy(Scripted):
+        def step(self, stamp_ns: int, drive: float, dt: float) -> PlantSample | None:  # type: ignore[override]
+            sample = super().step(stamp_ns, drive, dt)
+            return None if len(self.drives) % 10 == 5 else sample
+
+    loop, ports = run(Gappy(catch_up=10_000), 200, wait_until)
+    steps = {b.stamp_ns - a.stamp_ns for a, b in zip(ports.samples, ports.samples[1:], strict=False)}
+    assert steps == {PERIOD, 2 * PERIOD}
+    assert loop.lost == len(ports.samples + [None] * loop.lost) - loop.samples
+    assert 20 <= loop.lost <= loop.samples / 8
+
+
+def test_a_plant_with_a_beat_of_its_own_says_when_to_begin(wait_until: Any) -> None:
+    class Beating(Scripted):
+        first = 0
+
+        def first_instant(self, earliest_ns: int) -> int:
+            self.first = earliest_ns + 50 * PERIOD + 123_456
+            return self.first
+
+    backend = Beating(catch_up=10_000)
+    _, ports = run(backend, 20, wait_until)
+    offset = time.time_ns() - time.monotonic_ns()
+    assert abs(ports.samples[0].stamp_ns - offset - backend.first) < 10 * PERIOD
+
+
 def test_a_backend_that_fails_ends_at_zero_volts_with_its_error(wait_until: Any) -> None:
     def burst(k: int) -> None:
         if k == 20:

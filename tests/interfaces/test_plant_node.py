@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -284,3 +285,11 @@ def test_the_clock_does_not_follow_itself(start: Any, client: Any, wait_until: A
     wait_until(lambda: len(states) > 10, "states of a plant that was launched on simulated time")
     subscribers = client.node.get_subscriptions_info_by_topic("/clock")
     assert "plant" not in [info.node_name for info in subscribers]
+
+
+def test_what_the_plant_is_reaches_whoever_comes_later(start: Any, client: Any, wait_until: Any) -> None:
+    start()
+    wait_until(lambda: client.state() == "active", "an active plant")
+    told = client.collect("description", depth=1)
+    wait_until(lambda: told, "the latched description")
+    assert json.loads(told[-1].data) == {"hardware": "integrator", "gain": 0.05}
