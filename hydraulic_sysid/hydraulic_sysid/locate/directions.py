@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from hydraulic_sim.effect import arguments
+
 from .curves import lagged, play, rate_limited, shifted, tents
 from .knots import Knots
 from .signals import Signals
@@ -25,6 +27,8 @@ LAGS = (1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 32e-3, 64e-3)
 """Seconds ago that a valve may follow what it was told."""
 _SUPPLY_LAGS = (0.1, 1.0)
 _WIDTHS = (0.003, 0.01, 0.03)
+_UNRESOLVED = (2.0, 6.0)  # standard deviations of the position's noise over which dry friction turns around
+_LATE = 5e-3  # s
 _GAPS = (1e-4, 5e-4, 2e-3)
 _RATES = (1.0, 3.0, 10.0, 30.0)
 _RESONANCES = (3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0)
@@ -57,6 +61,23 @@ def families(s: Signals, balances: tuple[str, ...], k: Knots, waves: Array) -> l
         found += [_valve(s, k, waves, True)] if "spool" in balances else []
         found += [_supply(s, k, waves, True)] if "supply" in balances else []
     return found
+
+
+def turning(s: Signals, noise: float) -> Array:
+    """Forces ``(T, n)`` by which laws of dry friction differ while it turns around, none for a model without any.
+
+    Within a few times what the position sensor resolves (``noise`` [m]) no motion is seen that would tell one law from
+    another, and a smoothed velocity changes its sign early or late: neither is a fault of the model.
+    """
+    model = s.plant.model
+    dry = any("direction" in arguments(f) for e in model.effects for f in model.library[e].functions().values())
+    if not dry:
+        return np.zeros((0, s.time.size))
+    late = max(1, int(round(_LATE / s.dt)))
+    early = np.concatenate((s.direction[late:], np.full(late, s.direction[-1])))
+    gaps = [times * noise for times in _UNRESOLVED]
+    turns = [(s.position - play(s.position, 0.5 * gap)) / gap for gap in gaps]
+    return np.array([early - s.direction, shifted(s.direction, late) - s.direction, *turns])
 
 
 def _force(s: Signals, k: Knots, waves: Array) -> Family:
@@ -165,17 +186,17 @@ def _flow(s: Signals, k: Knots) -> Family:
 
 def _fluid(s: Signals, k: Knots) -> Family:
     f = Family("fluid")
-    stored_a, stored_b = -s.capacity_a * s.path.rate_a, -s.capacity_b * s.path.rate_b
+    stored_a, stored_b = -s.capacity_a * s.rate_a, -s.capacity_b * s.rate_b
     for in_a, in_b in zip(tents(s.pressure_a, k.pressure), tents(s.pressure_b, k.pressure), strict=True):
         f.add("pressure", flow_a=in_a * stored_a, flow_b=in_b * stored_b)
     for power in (1, 2):
         thin_a, thin_b = (np.maximum(p, 1e5) ** -power for p in (s.pressure_a, s.pressure_b))
         f.add("pressure", flow_a=thin_a * stored_a, flow_b=thin_b * stored_b)
-    f.add("rate", flow_a=-s.path.rate_a, flow_b=-s.path.rate_b)
+    f.add("rate", flow_a=-s.rate_a, flow_b=-s.rate_b)
     for time in _CREEP:
-        f.add("history", flow_a=-lagged(s.path.rate_a, s.dt, time), flow_b=-lagged(s.path.rate_b, s.dt, time))
-    f.add("rate", flow_a=-s.path.rate_a)
-    f.add("rate", flow_b=-s.path.rate_b)
+        f.add("history", flow_a=-lagged(s.rate_a, s.dt, time), flow_b=-lagged(s.rate_b, s.dt, time))
+    f.add("rate", flow_a=-s.rate_a)
+    f.add("rate", flow_b=-s.rate_b)
     model = s.plant.model
     on = set(model.effects)
     friction = s.plant.value("viscous_friction.coefficient") if "viscous_friction" in on else 0.0

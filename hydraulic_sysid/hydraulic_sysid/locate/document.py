@@ -18,7 +18,7 @@ from hydraulic_sysid.results import heading
 
 from . import figures, words
 from .balances import NEEDS, Balances, LocateError, formable
-from .blame import Moments, Verdict, rank
+from .blame import PARAMETERS, Moments, Verdict, rank
 from .knots import Knots
 from .lines import common_lines
 from .noise_model import ORDER, RATE
@@ -99,6 +99,7 @@ def judge(
         low, high = balances.model.entry(key).bounds or (-np.inf, np.inf)
         value, size = balances.plant.value(key), size_of(balances, key)
         bounds.append((min((low - value) / size, -LEAST_MOVE), max((high - value) / size, LEAST_MOVE)))
+    bounds += [(-np.inf, np.inf)] * (subsystems.count(PARAMETERS) - len(keys))
     return rank(own, twin, subsystems, variables, bounds)
 
 

@@ -17,8 +17,7 @@ from .path import Path
 
 Array = NDArray[np.float64]
 
-_PRESSURE_SPAN = 0.025  # s, of the quadratic that smooths pressures and their rates
-_MOTION_SPAN = 0.025  # s, shortest of the cubic that gives accelerations
+_CUBIC = 3
 _MOVING = 3.0  # standard deviations of the velocity's noise at which a piston surely moves
 
 
@@ -42,6 +41,8 @@ class Signals:
     opening: Array
     pressure_a: Array
     pressure_b: Array
+    rate_a: Array
+    rate_b: Array
     capacity_a: Array
     capacity_b: Array
     flow_a: Array
@@ -94,9 +95,12 @@ class Signals:
 
 def signals_of(
     plant: Plant, read: Mapping[str, Array], drive: Array, dt: float, formed: Residuals, to_velocity: VelocityFilter,
-    velocity_noise: float, path: Path,
+    velocity_noise: float, path: Path, windows: Mapping[str, int],
 ) -> Signals:  # fmt: skip
-    """From channels as they were (sensor errors taken out), the balances formed of them and the model's path."""
+    """From channels as they were (sensor errors taken out), the balances formed of them and the model's path.
+
+    ``windows``: see `smoothing_windows`.
+    """
     n = formed.values.shape[1]
     x = read["position"]
     hydraulic = plant.model.kind == "hydraulic"
@@ -105,7 +109,12 @@ def signals_of(
     def middle(values: Array) -> Array:
         return 0.5 * (values[1 : n + 1] + values[:n])
 
-    smooth = smoothed(read, dt, to_velocity)
+    smooth = smoothed(read, windows)
+
+    def rate(name: str) -> Array:
+        if name not in read:
+            return none
+        return middle(savgol_filter(read[name], windows[name], _CUBIC, deriv=1, delta=dt))
 
     velocity = middle(to_velocity(x))
     threshold = max(_MOVING * velocity_noise, 1e-9)
@@ -122,6 +131,8 @@ def signals_of(
         opening=made["opening"],
         pressure_a=middle(smooth["pressure_a"]) if "pressure_a" in smooth else none,
         pressure_b=middle(smooth["pressure_b"]) if "pressure_b" in smooth else none,
+        rate_a=rate("pressure_a"),
+        rate_b=rate("pressure_b"),
         capacity_a=made.get("capacity_a", none),
         capacity_b=made.get("capacity_b", none),
         flow_a=made.get("flow_a", none),
@@ -131,16 +142,11 @@ def signals_of(
     )
 
 
-def smoothed(read: Mapping[str, Array], dt: float, to_velocity: VelocityFilter) -> dict[str, Array]:
-    """Position and pressures (N,) through local polynomials, long enough for derivatives to mean something."""
-    found = {}
-    for name, values in read.items():
-        if name == "position":
-            found[name] = savgol_filter(values, max(to_velocity.window, _odd(_MOTION_SPAN, dt)), 3)
-        else:
-            found[name] = savgol_filter(values, _odd(_PRESSURE_SPAN, dt), 2)
-    return found
+def smoothing_windows(channels: Mapping[str, Array], noise: Mapping[str, float], dt: float) -> dict[str, int]:
+    """Samples of the cubic that gives each channel's rate with the smallest expected error (see `VelocityFilter`)."""
+    return {n: VelocityFilter.for_signal(v, dt, noise[n]).window for n, v in channels.items() if n != "drive"}
 
 
-def _odd(seconds: float, dt: float) -> int:
-    return max(5, 2 * int(round(0.5 * seconds / dt)) + 1)
+def smoothed(read: Mapping[str, Array], windows: Mapping[str, int]) -> dict[str, Array]:
+    """Position and pressures (N,) through cubics of their windows."""
+    return {n: savgol_filter(v, windows[n], _CUBIC) for n, v in read.items()}

@@ -14,13 +14,13 @@ from hydraulic_sysid.records import Record
 
 from .balances import Balances, Residuals
 from .blame import PARAMETERS, Moments
-from .directions import families
+from .directions import families, turning
 from .knots import Knots
 from .lines import waves
 from .noise_model import Whitener, thin, thinning
 from .path import path_of
 from .sensors import SensorErrors, sensor_errors
-from .signals import Signals, signals_of, smoothed
+from .signals import Signals, signals_of, smoothed, smoothing_windows
 
 Array = NDArray[np.float64]
 
@@ -39,14 +39,13 @@ class Side:
 
 @dataclass(frozen=True)
 class Study:
-    """A record and its twin. ``noise`` (B, n): what the twin's noise alone does to the balances; ``moved`` (P, B, m):
-    what its parameters do, whitened, per change by their size."""
+    """A record and its twin. ``moved`` (P, B, m): what its parameters do to its balances, whitened, per change by their
+    size."""
 
     data: Measured
     names: tuple[str, ...]
     own: Side
     twin: Side
-    noise: Array
     whitener: Whitener
     factor: int
     moved: Array
@@ -68,11 +67,15 @@ def study(balances: Balances, record: Record, names: tuple[str, ...], keys: Sequ
     own = {n: v for n, v in data.channels.items() if n in _SENSED or n == "drive"}
     rng = np.random.default_rng(seed)
     clean = {**own, **{n: free[n] for n in own if n != "drive"}}
-    noisy = {n: v if n == "drive" else v + data.noise[n] * rng.standard_normal(v.size) for n, v in clean.items()}
-    formed, bare, twin = (balances.form(c, dt, names, filter_, errors) for c in (own, clean, noisy))
-    noise = twin.values - bare.values
-    whitener = Whitener.of(thin(noise, factor))
-    still = {**own, **smoothed({n: v for n, v in own.items() if n in _SENSED}, dt, filter_)}
+    # Noise drawn a second time makes the whitener: the twin's own would look whiter to it than the record's can.
+    noisy, other = (
+        {n: v if n == "drive" else v + data.noise[n] * rng.standard_normal(v.size) for n, v in clean.items()}
+        for _ in range(2)
+    )
+    formed, bare, twin, again = (balances.form(c, dt, names, filter_, errors) for c in (own, clean, noisy, other))
+    whitener = Whitener.of(thin(again.values - bare.values, factor))
+    windows = smoothing_windows(own, data.noise, dt)
+    still = {**own, **smoothed({n: v for n, v in own.items() if n in _SENSED}, windows)}
     moved = _parameters(balances, still, dt, names, filter_, errors, keys)
     sides: dict[str, Side] = {}
     for which, channels, residuals in (("own", own, formed), ("twin", noisy, twin)):
@@ -80,10 +83,12 @@ def study(balances: Balances, record: Record, names: tuple[str, ...], keys: Sequ
         none = np.full(len(record), np.nan)
         x, pa, pb = read["position"], read.get("pressure_a", none), read.get("pressure_b", none)
         path = path_of(plant, record["drive"], dt, x, filter_(x), pa, pb, residuals.values.shape[1])
-        signals = signals_of(plant, read, record["drive"], dt, residuals, filter_, data.noise["velocity"], path)
+        signals = signals_of(
+            plant, read, record["drive"], dt, residuals, filter_, data.noise["velocity"], path, windows
+        )
         sides[which] = Side(residuals, whitener(thin(residuals.values, factor)), signals)
     thinned = whitener(thin(moved, factor))
-    return Study(data, names, sides["own"], sides["twin"], noise, whitener, factor, thinned)
+    return Study(data, names, sides["own"], sides["twin"], whitener, factor, thinned)
 
 
 def moments(
@@ -106,9 +111,12 @@ def moments(
             found.append(s.whitener(thin(values, s.factor), rows))
             subsystems += [family.subsystem] * len(members)
             variables += [family.variables[i] for i in members]
-    every = np.concatenate((s.moved, *found))
-    made = Moments.of(every, side.white, s.rate)
-    return made, [PARAMETERS] * len(s.moved) + subsystems, [""] * len(s.moved) + variables
+    turns = np.zeros((0, *s.moved.shape[1:]))
+    if "force" in names:
+        turns = s.whitener(thin(turning(side.signals, s.data.noise["position"])[:, None], s.factor), (0,))
+    given = np.concatenate((s.moved, turns))
+    made = Moments.of(np.concatenate((given, *found)), side.white, s.rate)
+    return made, [PARAMETERS] * len(given) + subsystems, [""] * len(given) + variables
 
 
 def size_of(balances: Balances, key: str) -> float:
