@@ -31,7 +31,8 @@ def main(argv: list[str] | None = None) -> int:
     names = verb_names()
     if not arguments or arguments[0] in ("-h", "--help"):
         print("usage: python -m hydraulic_sysid VERB …   (VERB --help for its options)\n")
-        print("\n".join(f"  {name:<12}{summary(name)}" for name in names))
+        width = max(map(len, names)) + 2
+        print("\n".join(f"  {name:<{width}}{summary(name)}" for name in names))
         return 0 if arguments else 2
     if arguments[0] not in names:
         print(f"hydraulic_sysid: no verb {arguments[0]!r}; there are {', '.join(names)}", file=sys.stderr)
