@@ -5,6 +5,7 @@ The bus file is the shipped one with more patience: what is tested here is the c
 
 from __future__ import annotations
 
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -16,6 +17,8 @@ from hydraulic_can_driver.bus_file import SHIPPED, load_bus
 from hydraulic_can_driver.can_bus import open_can
 from hydraulic_can_driver.nodes import can_driver
 from hydraulic_can_driver.virtual import Reading, VirtualBench
+from hydraulic_can_driver.virtual.faults import StatusFault
+from hydraulic_can_driver.virtual.wiring import Event
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 
@@ -51,13 +54,25 @@ def patient_file(folder: Path, changes: dict[str, dict[str, Any]] = CHANGES) -> 
     return path
 
 
+def tell(event: Event) -> None:
+    """Print what the valve does."""
+    if event.kind == "state":
+        print(f"valve: {event.detail}", flush=True)
+
+
 def main() -> int:
-    """Run the node until it is told to stop."""
+    """Run the node until it is told to stop; SIGUSR1 and SIGUSR2 begin and end a fault of the valve."""
     with tempfile.TemporaryDirectory() as folder:
         path = patient_file(Path(folder))
         bus = load_bus(path)
-        with VirtualBench(bus, open_can(bus.interface, bus.channel), Actuator("sample_bench")):
-            return can_driver.main([*sys.argv[1:], "--ros-args", "-p", f"bus:={path}"])
+        fault = StatusFault("valve")
+        with VirtualBench(bus, open_can(bus.interface, bus.channel), Actuator("sample_bench")) as devices:
+            devices.listeners.append(tell)
+            signal.signal(signal.SIGUSR1, lambda *_: devices.inject(fault))
+            signal.signal(signal.SIGUSR2, lambda *_: devices.clear(fault))
+            code = can_driver.main([*sys.argv[1:], "--ros-args", "-p", f"bus:={path}"])
+            print(f"left behind: {devices.valve.machine.state.label}, {devices.drive:g} V", flush=True)
+            return code
 
 
 if __name__ == "__main__":
