@@ -25,7 +25,7 @@ PROFILES: dict[int, type[Device]] = {kind.profile: kind for kind in (Valve, Lvdt
 
 _SYNC = 0x80
 _HEARTBEAT = 0x700
-_TICK_S = 0.005
+_TICK_S = 0.005, 0.02  # shortest and longest; half a period between them
 _FREE_RUN_S = 0.02  # silence of SYNC after which the plant goes on by the clock
 _FREE_RUN_PERIODS = 5
 _NOTIFIER_S = 0.1
@@ -171,7 +171,8 @@ class VirtualBench:
 
     def _tick(self) -> None:
         patience = max(_FREE_RUN_S, _FREE_RUN_PERIODS / self.bus.rate)
-        while not self._ending.wait(_TICK_S):
+        tick = min(max(0.5 / self.bus.rate, _TICK_S[0]), _TICK_S[1])
+        while not self._ending.wait(tick):
             with self._lock, self._watched():
                 now = time.monotonic()
                 for _ in range(self._clock.overdue(now, patience)):
