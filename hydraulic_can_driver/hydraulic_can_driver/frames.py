@@ -34,6 +34,7 @@ class Frames:
         self._changed = threading.Condition(threading.Lock())
         self._raw: dict[int, bytes] = {}
         self._missing: set[int] = set(self._codecs)
+        self._lacked = self._missing
         self._open = False
         self.cycle = 0
         self.sync_ns = 0
@@ -60,6 +61,7 @@ class Frames:
         """What comes from here to the next SYNC is late."""
         with self._changed:
             self._open = False
+            self._lacked = set(self._missing)
             for cob_id in self._codecs:
                 owed = self.owed.get(cob_id, 0)
                 run, before = self._run.get(cob_id, (0, owed))
@@ -125,10 +127,10 @@ class Frames:
             return self.cycle > 0 and cob_id not in self._missing
 
     def lacking(self) -> list[str]:
-        """Names of the devices whose frames are missing in this cycle."""
+        """Names of the devices whose frames were missing when the cycle ended; a frame may have come since."""
         with self._changed:
-            missing = sorted(self._missing)
-        return list(dict.fromkeys(self._nodes[cob_id].name for cob_id in missing))
+            lacked = sorted(self._lacked)
+        return list(dict.fromkeys(self._nodes[cob_id].name for cob_id in lacked))
 
     def quantities(self) -> dict[str, float]:
         """Latest value of every signal, in SI; words of bits as integers."""

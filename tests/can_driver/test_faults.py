@@ -48,9 +48,7 @@ CASES = {
     "cable of the spool": Case(upset.CableBreak("valve"), Fault.EMERGENCY, "valve: EMCY"),
     "power cut of a sensor": Case(upset.PowerCut("lvdt"), Fault.FRAMES, "lvdt", after="configure", settings=SOON),
     "power cut of the valve": Case(upset.PowerCut("valve"), Fault.FRAMES, "valve", after="configure", settings=SOON),
-    "connector out": Case(
-        upset.Unplugged("valve"), Fault.FRAMES, "valve", after="configure", settings={**SOON, "lost_after": 2.0}
-    ),
+    "connector out": Case(upset.Unplugged("lvdt"), Fault.FRAMES, "lvdt", after="activate", settings=SOON),
     "bus-off": Case(upset.BusOff(), Fault.BUS, "bus-off", lasts=False),
 }
 
