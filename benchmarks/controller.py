@@ -27,6 +27,7 @@ from hydraulic_control.controller import Controller
 from hydraulic_control.evaluation import over_scatter
 from hydraulic_control.parameters import CONTROLLERS
 from hydraulic_control.response import Response, step_figures
+from hydraulic_control.session import Fault
 from hydraulic_control.simulation import SensorNoise
 from hydraulic_control.tuning import Criteria
 
@@ -116,7 +117,7 @@ def measure_graph(seconds: float, repeat: int, gains: str) -> bool:
         ]
         try:
             rises = [rise_time(Path(folder) / f"{i}.json") for i in range(repeat)]
-            latency = listen(seconds)
+            latency, refused = listen(seconds)
         finally:
             for process in started:
                 process.terminate()
@@ -126,6 +127,7 @@ def measure_graph(seconds: float, repeat: int, gains: str) -> bool:
     print(f"\nthrough topics at 1 kHz, {os.cpu_count()} cores, gains {gains}")
     text = ", ".join(f"{key} {value:.3f}" for key, value in latency.items())
     print(f"  state stamp to command published [ms]: {text}; goal p50 {LATENCY_GOAL_MS:g}")
+    print(f"  states refused, by reason: {refused or 'none'}")
     print(
         f"  rise time of a 50 mm step, {repeat} times: median {statistics.median(rises):.4f} s, "
         f"{min(rises):.4f} … {max(rises):.4f}, spread {spread:.2%}; goal {SPREAD_GOAL:.0%}"
@@ -151,8 +153,8 @@ def rise_time(output: Path) -> float:
     return step_figures(Response.from_document(json.loads(output.read_text()))).rise_time
 
 
-def listen(seconds: float) -> dict[str, float]:
-    """Latency [ms] as the controller tells it in its diagnostics: medians over the time."""
+def listen(seconds: float) -> tuple[dict[str, float], str]:
+    """Latency [ms] as the controller tells it in its diagnostics, medians over the time; and what it has refused."""
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
 
@@ -173,7 +175,9 @@ def listen(seconds: float) -> dict[str, float]:
     told = [row for row in rows if "latency_p50_ms" in row]
     if not told:
         raise SystemExit("the controller told no latency")
-    return {key: statistics.median(float(row[f"latency_{key}_ms"]) for row in told) for key in ("p50", "p99")}
+    refused = {fault.name.lower(): told[-1].get(fault.name.lower(), "0") for fault in Fault}
+    latency = {key: statistics.median(float(row[f"latency_{key}_ms"]) for row in told) for key in ("p50", "p99")}
+    return latency, ", ".join(f"{name} {count}" for name, count in refused.items() if count != "0")
 
 
 def main() -> int:

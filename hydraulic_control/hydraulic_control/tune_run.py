@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hydraulic_control import rules
@@ -112,9 +112,10 @@ def tune(
     found = search(law, starts(law, gains, simple, force))
     if law != "npid":
         return found
-    linear = search("pid", starts("pid", gains, simple, force)).values
-    softened = [linear | {"controller": "npid"} | _shaped(linear, shape) for shape in SHAPES]
-    return min(found, search("npid", softened), key=lambda one: one.cost)
+    linear = search("pid", starts("pid", gains, simple, force))
+    softened = [linear.values | {"controller": "npid"} | _shaped(linear.values, shape) for shape in SHAPES]
+    same = replace(linear, values=linear.values | {"controller": "npid", "k1": 0.0})
+    return min(found, search("npid", softened), same, key=lambda one: one.cost)
 
 
 def _shaped(values: Mapping[str, Any], shape: Mapping[str, float]) -> dict[str, float]:

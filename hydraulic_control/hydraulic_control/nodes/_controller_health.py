@@ -21,6 +21,7 @@ class ControllerHealth:
         self._seen = 0
         self._answered = 0
         self._then_ns = 0
+        self.scheduling = "normal"
         self.latencies: deque[float] = deque(maxlen=2000)
 
     def message(self, state: str, now_ns: int) -> DiagnosticArray:
@@ -40,6 +41,7 @@ class ControllerHealth:
             "reference_m": "none" if session.reference is None else f"{session.reference.position:.6f}",
             "answered": session.answered,
             "rate_Hz": f"{rate:.1f}",
+            "scheduling": self.scheduling,
             "last_trouble": session.trouble,
             **{fault.name.lower(): count for fault, count in session.faults.items()},
         }

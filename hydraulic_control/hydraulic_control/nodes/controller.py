@@ -28,6 +28,7 @@ from hydraulic_interfaces.conversions import (
 )
 from hydraulic_interfaces.nodes.guarded_lifecycle import guard_transitions
 from hydraulic_interfaces.nodes.serving import Served, serve
+from hydraulic_interfaces.pacing import release_realtime_for_all, request_realtime_for_all
 from hydraulic_interfaces.qos import profile
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -72,6 +73,8 @@ class ControllerNode(Served, LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Hold the position that the next state reports, until a reference comes."""
         self._session.begin()
+        if priority := self._settings.table["realtime_priority"]:
+            self._health.scheduling = request_realtime_for_all(priority)
         self._heard, self._state = self._steady(), "active"
         return SUCCESS
 
@@ -80,6 +83,7 @@ class ControllerNode(Served, LifecycleNode):
         self._state = "inactive"
         self._session.begin()
         self._command.publish(self._encode(self._stamp_ns, 0.0))
+        release_realtime_for_all()
         return SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
