@@ -7,13 +7,14 @@ against the plant's time constants, as all poles then crowd at z = 1; the recurs
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from hydraulic_sysid.jit import jit
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@jit
 def propagate(transition: Array, forcing: Array, initial: Array) -> Array:
     """States ``x[0] = initial``, ``x[k+1] = transition·x[k] + forcing[k]``, as ``(N, n)`` for forcing ``(N, n)``."""
     count, size = forcing.shape

@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
+from hydraulic_sysid.jit import jit
 from hydraulic_sysid.linear_models import IdentificationError, TransferFunctionOrder, fit_transfer_function
 from hydraulic_sysid.linear_models.order_selection import information_criteria
 from hydraulic_sysid.linear_models.series import experiments, lengths_agree
@@ -29,7 +29,7 @@ _FAR = 1e3  # residual, in standard deviations of the output, of a run that has 
 _DYNAMICS = 4  # p_S, b, l, d
 
 
-@njit(cache=True)
+@jit
 def _run(flow: Array, supply: float, b: float, leak: float, damping: float, start: Array, step: float) -> Array:
     """Pressure ``(N,)`` by Runge–Kutta's method of fourth order, ``_SUBSTEPS`` to a sample; NaN once it diverges."""
     out = np.full(flow.size, np.nan)
