@@ -165,3 +165,13 @@ def test_realisations_have_one_amplitude_and_phases_of_their_own(tmp_path: Path)
     assert one.signal.size == pytest.approx(two.signal.size, rel=1e-6)
     np.testing.assert_array_equal(one.signal.lines(), two.signal.lines())  # type: ignore[attr-defined]
     assert np.abs(one.open_loop - two.open_loop).max() > 0.1
+
+
+def test_a_band_below_what_the_duration_holds_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["design", "chirp", "--model", "sample_bench", "--duration", "10", "--out"]
+    assert main([*arguments, str(tmp_path / "short")]) == 0
+    assert "periods of the lowest frequency: play it longer" in " ".join(capsys.readouterr().out.split())
+    # With friction, which a probe sees, the same actuator is much better damped.
+    assert main([*arguments, str(tmp_path / "probed"), "--probe", "probe"]) == 0
+    low, wide = (json.loads((tmp_path / n / "design.json").read_text())["bandwidth"] for n in ("short", "probed"))
+    assert wide > 2.0 * low

@@ -30,6 +30,9 @@ def document(
         f"{named[:1].upper()}{named[1:]} from {number(band[0])} to {number(band[1])} Hz{part}, "
         f"{quantity(first.prediction.drive_peak, 'V')} at its peak; {first.prediction.limited_by} allows no more."
     )
+    periods = first.active_time * band[0]
+    if periods < 1.0:
+        text += f" Its {first.active_time:g} s hold {number(periods)} periods of the lowest frequency: play it longer."
     return {
         **heading("design"),
         "verdict": {"level": "explained", "text": text},

@@ -17,9 +17,9 @@ from rich.table import Table
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import Model, load_model
 from hydraulic_sysid import cli, results
-from hydraulic_sysid.bandwidth import from_model
+from hydraulic_sysid.bandwidth import from_model, from_rehearsal
 from hydraulic_sysid.display import quantity, span
-from hydraulic_sysid.excitation import ExcitationError, save_plan
+from hydraulic_sysid.excitation import ExcitationError, load_plan, save_plan
 from hydraulic_sysid.excitation.amplitude import Limits, Sized, largest
 from hydraulic_sysid.excitation.design import SIGNALS, Wish, propose
 from hydraulic_sysid.excitation.design_document import document
@@ -50,6 +50,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--model", metavar="FILE", required=True, help="model file, or the name of a preset")
     band = parser.add_mutually_exclusive_group()
     band.add_argument("--bandwidth", metavar="HZ", type=float, help="of the actuator (default: that of the model)")
+    band.add_argument("--probe", metavar="PLAN", help="bandwidth of a probe played on the model, with its friction")
     band.add_argument("--band", metavar=("LOW", "HIGH"), type=float, nargs=2, help="excite this band [Hz] instead")
     parser.add_argument(
         "--share", metavar=("LOW", "HIGH"), type=float, nargs=2, default=(0.1, 2.0), help="band over bandwidth (0.1 2)"
@@ -73,7 +74,9 @@ def _design(options: argparse.Namespace) -> int:
         raise ExcitationError("--realisations is 1 or more, --part above 0 and up to 1")
     model = load_model(options.model)
     bandwidth = options.bandwidth
-    if bandwidth is None and options.band is None:
+    if options.probe:
+        bandwidth = from_rehearsal(model, load_plan(options.probe))[0].position
+    elif bandwidth is None and options.band is None:
         bandwidth = from_model(model, options.centre).position
     low, high = options.band or (options.share[0] * bandwidth, options.share[1] * bandwidth)
     limits = Limits.of(model, options.centre)

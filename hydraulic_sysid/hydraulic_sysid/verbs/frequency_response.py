@@ -1,4 +1,4 @@
-"""Frequency response of records, with coherence; of multisines with the noise and the nonlinear distortion apart.
+"""Frequency response of records with coherence, noise and nonlinear distortion apart.
 
 Records of a periodic excitation give the best linear approximation: noise from the differences between periods,
 distortion from the detection lines and from the differences between realisations. Others give Welch's estimate, with
