@@ -137,11 +137,11 @@ class Bench:
         return sample
 
     def reset(self) -> None:
-        """Reset the fault of the valve, and forget all others whose cause is gone.
+        """Reset the fault of the valve, and forget all others whose cause is gone; nothing where nothing is wrong.
 
         :raises DeviceError: a cause is still there, or the devices have to be configured anew.
         """
-        if not self._looping:
+        if not self._looping or not (self.problem or self.machine.problem):
             return
         if any(fault in self.faults for fault in NEEDS_CONFIGURE):
             raise DeviceError(f"{self.faults.text}: deactivate, clean up and configure anew")

@@ -160,6 +160,20 @@ def reset_quietly(bench: Bench) -> None:
         bench.reset()
 
 
+def test_a_reset_without_a_fault_disturbs_nothing(
+    bench: Bench, wire: Any, loop_of: Callable[..., Any], wait_until: Any
+) -> None:
+    bench.boot()
+    bench.start()
+    loop = loop_of(bench)
+    loop.first.wait()
+    bench.follow(State.ACTIVE)
+    wire.log.clear()
+    bench.reset()
+    wait_until(lambda: len(wire.sent(0x510)) > 5, "more cycles")
+    assert {data[0] for _, data in wire.sent(0x510)} == {7}
+
+
 FOREIGN = {"NMT": (0x000, "0100"), "SYNC": (0x080, ""), "drive": (0x510, "0f000040"), "heartbeat": (0x77F, "05")}
 
 
