@@ -103,6 +103,18 @@ def test_encoders_write_no_byte_too_many() -> None:
     assert store.deserialize_cdr(cv.PressureEncoder()(5, 7e6), pressure).fluid_pressure == 7e6
 
 
+def test_encoded_references_are_the_messages() -> None:
+    from rclpy.serialization import deserialize_message
+    from sensor_msgs.msg import JointState
+
+    from hydraulic_interfaces.samples import Reference
+
+    encode = cv.ReferenceEncoder()
+    for reference in (Reference(5, 0.25, -1.5), Reference(1_700_000_000_123_456_789, -0.1, 0.0)):
+        data = encode(reference.stamp_ns, reference.position, reference.velocity)
+        assert cv.reference_from_message(deserialize_message(data, JointState)) == reference
+
+
 def test_an_encoder_can_be_used_again() -> None:
     from rclpy.serialization import deserialize_message
     from sensor_msgs.msg import JointState
