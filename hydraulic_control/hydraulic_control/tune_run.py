@@ -133,6 +133,8 @@ def starts(
         return [
             common | model | {"pole_placement.frequency": f, "pole_placement.observer": 3.0 * f} for f in FREQUENCIES
         ]
+    # Polynomials take what is fed forward for a disturbance and fight it.
+    common["velocity_feedforward"] = 1.0 / simple[0]
     if law == "pid":
         return [common | g.as_values() for g in gains.values()]
     return [
