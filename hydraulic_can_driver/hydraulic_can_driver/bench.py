@@ -167,13 +167,13 @@ class Bench:
         if not self.operational:
             return
         self.receiver.watching = self.faults.armed = False
-        why = self.faults.text
+        why, valve = self.faults.text, self.bus.valve
         try:
             for goal in (State.DISABLED, State.INIT):
                 self.machine = StateMachine(self.bus.monitoring.state_change)
                 self.machine.fail("stopping")
                 self.machine.control = CONTROL_WORDS[goal]
-                if self.receiver.states.get(self.bus.valve.name) == OPERATIONAL:
+                if not valve.heartbeat or self.receiver.states.get(valve.name) == OPERATIONAL:
                     self._cycles_until(lambda goal=goal: self.machine.state in (goal, *_QUIET[2:]), _STOPPING_S)  # type: ignore[misc]
         finally:
             self.operational = self._looping = False
@@ -249,7 +249,8 @@ class Bench:
         return answered and self.machine.arrived and self.machine.goal is State.DISABLED
 
     def _reason(self) -> str:
-        silent = [node.name for node in self.bus.nodes.values() if self.receiver.states.get(node.name) != OPERATIONAL]
+        states, nodes = self.receiver.states, self.bus.nodes.values()
+        silent = [node.name for node in nodes if node.heartbeat and states.get(node.name) != OPERATIONAL]
         if lacking := self.frames.lacking():
             return f"no frames from {', '.join(lacking)}"
         if self.machine.problem:

@@ -24,7 +24,8 @@ STATES = {BOOT_UP: "boot-up", STOPPED: "STOPPED", OPERATIONAL: "OPERATIONAL", PR
 _EMERGENCY = struct.Struct("<HB5s")
 # Linux, include/uapi/linux/can/error.h: these classes of error frames end all traffic.
 _BUS_OFF = 0x40
-_ECHOES = 3
+# After this time the echo of a frame is taken to be lost, and excuses no stranger any more.
+_ECHO_S = 1.0
 
 
 class Receiver(can.Listener):
@@ -44,7 +45,7 @@ class Receiver(can.Listener):
         self.unexpected = 0
         self.priority = 0
         self._echo = hears_itself(interface)
-        self._outstanding: dict[int, int] = {}
+        self._outstanding: dict[int, deque[float]] = {}
         self._handlers: dict[int, Callable[[bytes], None]] = {}
         self._known: set[int] = set()
         for cob_id in frames.cob_ids:
@@ -91,13 +92,13 @@ class Receiver(can.Listener):
     def sending(self, cob_id: int) -> None:
         """The driver is about to send a frame, which may come back to it."""
         if self._echo:
-            # Echoes that were lost must not excuse strangers for ever.
-            self._outstanding[cob_id] = min(self._outstanding.get(cob_id, 0) + 1, _ECHOES)
+            self._outstanding.setdefault(cob_id, deque(maxlen=5000)).append(time.monotonic())
 
     def _own(self, cob_id: int) -> None:
-        if self._outstanding.get(cob_id, 0) > 0:
-            self._outstanding[cob_id] -= 1
-            return
+        echoes, now = self._outstanding.get(cob_id, deque()), time.monotonic()
+        while echoes:
+            if now - echoes.popleft() < _ECHO_S:
+                return
         self.unexpected += 1
         if self.watching:
             self._faults.report(Fault.SECOND_MASTER, f"a second master on the bus: COB-ID 0x{cob_id:03X} is not ours")

@@ -1,0 +1,109 @@
+"""Sorting of what comes: the driver's own echoes, strangers, heartbeats, emergencies, error frames."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import can
+import pytest
+
+from hydraulic_can_driver import receiver as module
+from hydraulic_can_driver.bus_file import load_bus
+from hydraulic_can_driver.faults import Fault, FaultLatch
+from hydraulic_can_driver.frames import Frames
+from hydraulic_can_driver.receiver import Receiver
+
+
+def listening(interface: str) -> tuple[Receiver, FaultLatch]:
+    bus, faults = load_bus("bench"), FaultLatch()
+    faults.armed = True
+    one = Receiver(bus, Frames(bus, faults), faults, interface)
+    one.watching = True
+    return one, faults
+
+
+def hear(one: Receiver, cob_id: int, data: str = "", **kind: bool) -> None:
+    one.on_message_received(
+        can.Message(arbitration_id=cob_id, data=bytes.fromhex(data), is_extended_id=kind.pop("extended", False), **kind)
+    )
+
+
+def test_echoes_that_come_late_and_all_at_once_are_no_stranger() -> None:
+    one, faults = listening("udp_multicast")
+    for _ in range(200):
+        one.sending(0x80)
+    for _ in range(200):
+        hear(one, 0x80)
+    assert not faults.text
+    hear(one, 0x80)
+    assert Fault.SECOND_MASTER in faults
+
+
+def test_an_echo_that_was_lost_does_not_excuse_a_stranger_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    one, faults = listening("udp_multicast")
+    now = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    one.sending(0x510)
+    now[0] += 1.5
+    hear(one, 0x510, "07000040")
+    assert Fault.SECOND_MASTER in faults
+
+
+def test_where_nothing_comes_back_every_such_frame_is_a_strangers() -> None:
+    one, faults = listening("socketcan")
+    one.sending(0x510)
+    hear(one, 0x510, "00000000")
+    assert Fault.SECOND_MASTER in faults
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "data", "fault", "words"),
+    [
+        (0x710, "00", Fault.RESTART, "valve has restarted"),
+        (0x720, "7f", Fault.RESTART, "lvdt is PRE-OPERATIONAL, not OPERATIONAL"),
+        (0x730, "04", Fault.RESTART, "pressure_a is STOPPED"),
+        (0x710, "63", Fault.RESTART, "valve is state 99"),
+        (0x090, "12340401aabbccdd", Fault.EMERGENCY, "valve: EMCY 0x3412, error register 0x04, 01 aa bb cc dd"),
+        (0x1A0, "00", Fault.LENGTH, "lvdt: COB-ID 0x1A0 has 1 bytes; mapped are 7"),
+    ],
+)
+def test_what_is_a_fault(cob_id: int, data: str, fault: Fault, words: str) -> None:
+    one, faults = listening("virtual")
+    hear(one, cob_id, data)
+    assert faults.latched == {fault} and words in faults.text
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "data"), [(0x710, ""), (0x710, "0505"), (0x090, "1234"), (0x3FF, "00"), (0x700, "")]
+)
+def test_what_is_only_counted(cob_id: int, data: str) -> None:
+    one, faults = listening("virtual")
+    hear(one, cob_id, data)
+    assert one.unexpected == 1 and not faults.text
+
+
+def test_the_end_of_an_emergency_is_no_fault() -> None:
+    one, faults = listening("virtual")
+    hear(one, 0x090, "0000000000000000")
+    assert not faults.text and one.emergencies[-1] == "valve: no error"
+
+
+@pytest.mark.parametrize("kind", [{"extended": True}, {"is_remote_frame": True}])
+def test_extended_and_remote_frames_are_not_ours(kind: dict[str, Any]) -> None:
+    one, faults = listening("virtual")
+    hear(one, 0x710, "" if "is_remote_frame" in kind else "00", **kind)
+    assert one.unexpected == 1 and not faults.text
+
+
+def test_bus_off() -> None:
+    one, faults = listening("socketcan")
+    hear(one, 0x04, "0000000000000000", is_error_frame=True)
+    assert not faults.text, "other error frames do not end the traffic"
+    hear(one, 0x40, "0000000000000000", is_error_frame=True)
+    assert Fault.BUS in faults and "bus-off" in faults.text
+
+
+def test_a_receiving_thread_that_fails() -> None:
+    one, faults = listening("socketcan")
+    one.on_error(OSError(100, "Network is down"))
+    assert "Network is down" in faults.text
