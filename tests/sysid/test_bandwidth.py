@@ -61,8 +61,9 @@ def test_a_response_that_does_not_reach_the_bandwidth_is_told() -> None:
     with pytest.raises(BandwidthError, match="measure to lower"):
         from_response(f[f > 5.0], g[f > 5.0])
     low = (f > 1e-2) & (f < 16.2)  # the crossover lies at 15.9 Hz
-    with pytest.raises(BandwidthError, match="velocity is not 3 dB down"):
-        from_response(f[low], g[low])
+    found = from_response(f[low], g[low])
+    assert np.isnan(found.velocity)  # which is no reason not to tell the other
+    assert found.position == pytest.approx(from_response(f, g).position, rel=1e-3)
 
 
 def record_of(natural: float, damping: float, noise: float) -> Record:

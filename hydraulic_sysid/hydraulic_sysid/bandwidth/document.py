@@ -67,9 +67,10 @@ def from_record(record: Record, period: float | None = None, start: float = 0.0)
 def document(found: Bandwidth, source: dict[str, Any], coherence: np.ndarray | None = None) -> dict[str, Any]:
     """The result document; ``source`` says what it was taken from (``kind``, ``name``, ``path``)."""
     low, high = found.band()
+    reach = f"to {found.velocity:.3g} Hz" if np.isfinite(found.velocity) else f"beyond {found.frequency[-1]:.3g} Hz"
     text = (
         f"Position bandwidth {found.position:.3g} Hz: excite from {low:.2g} to {high:.3g} Hz (0.1 … 2 times). "
-        f"The velocity follows to {found.velocity:.3g} Hz."
+        f"The velocity follows {reach}."
     )
     return {
         **heading("bandwidth"),

@@ -40,7 +40,7 @@ def _cards(result: Result) -> str:
     cards = (
         ("Position bandwidth", f"{number(result['position_bandwidth'])}<small> Hz</small>", "closed loop, −3 dB"),
         ("Excite", f"{low:.2g} … {high:.2g}<small> Hz</small>", "0.1 … 2 times the position bandwidth"),
-        ("Velocity bandwidth", f"{number(result['velocity_bandwidth'])}<small> Hz</small>", "open loop, −3 dB"),
+        ("Velocity bandwidth", f"{_or_beyond(result)}<small> Hz</small>", "open loop, −3 dB"),
         (
             "Critical gain",
             f"{number(result['critical_gain'])}<small> V/m</small>",
@@ -55,6 +55,12 @@ def _cards(result: Result) -> str:
         ),
         "cards",
     )
+
+
+def _or_beyond(result: Result) -> str:
+    """The velocity bandwidth, or the end of the response that lies below it."""
+    found = result["velocity_bandwidth"]
+    return f"&gt; {number(result['frequency'][-1])}" if found is None else number(found)
 
 
 def _definition(result: Result, place: Figures) -> str:
@@ -73,7 +79,8 @@ def responses(result: Result) -> go.Figure:
     velocity = np.abs(2.0 * np.pi * f * g) / result["velocity_gain"]
     closed = np.asarray(result["closed_loop"]["magnitude"], dtype=float)
     panels = Panels(1)
-    keep = (f >= 0.02 * result["position_bandwidth"]) & (f <= 5.0 * result["velocity_bandwidth"])
+    reach = result["velocity_bandwidth"] or f[-1]
+    keep = (f >= 0.02 * result["position_bandwidth"]) & (f <= 5.0 * reach)
     keep &= np.arange(f.size) % max(1, int(np.count_nonzero(keep) / 1500)) == 0
     for name, magnitude, colour, at in (
         ("position, closed loop", closed, style.HORIZON, result["position_bandwidth"]),
@@ -83,6 +90,8 @@ def responses(result: Result) -> go.Figure:
         panels.line(
             0, style.values(f[keep]), style.values(level), name, legend=True, line={"color": colour, "width": 2}
         )
+        if at is None:
+            continue
         panels.line(
             0, style.values([at]), style.values([-3.0103]), f"{name}: {number(at)} Hz", mode="markers",
             marker={"color": colour, "size": 11, "symbol": "circle-open", "line": {"width": 2}},

@@ -7,6 +7,7 @@ bandwidth (−3 dB of the velocity) is told beside it. Writes bandwidth.json and
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from typing import Any
 
@@ -85,11 +86,16 @@ def _print(result: dict[str, Any], console: Console) -> None:
     table.add_column("")
     table.add_column("", justify="right")
     table.add_row("position, closed loop", f"{number(result['position_bandwidth'])} Hz")
-    table.add_row("velocity, open loop", f"{number(result['velocity_bandwidth'])} Hz")
+    table.add_row("velocity, open loop", _velocity(result))
     table.add_row("velocity gain", f"{number(1e3 * result['velocity_gain'])} mm/(s·V)")
     table.add_row("critical gain", f"{number(result['critical_gain'])} V/m at {number(result['phase_crossover'])} Hz")
     console.print(table)
     console.print(result["verdict"]["text"])
+
+
+def _velocity(result: dict[str, Any]) -> str:
+    found = result["velocity_bandwidth"]
+    return f"{number(found)} Hz" if math.isfinite(found) else f"beyond {number(result['frequency'][-1])} Hz"
 
 
 if __name__ == "__main__":
