@@ -47,7 +47,9 @@ class RunningArx:
                 self.estimate.forget_past()
             step = self.estimate.update(slow.drive, slow.output)
             if step is not None:
-                self.fit.take(step.measured, step.predicted)
+                # What a model does not foresee before it has learned anything says nothing about it.
+                if self.estimate.updates > 2 * self.estimate.theta.size:
+                    self.fit.take(step.measured, step.predicted)
                 yield slow.stamp_ns, step
 
     def set_forgetting(self, value: float) -> None:
