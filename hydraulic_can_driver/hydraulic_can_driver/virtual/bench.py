@@ -65,7 +65,7 @@ class VirtualBench:
                 known = ", ".join(map(str, sorted(PROFILES)))
                 raise BusFileError(f"{bus.path}: node {name}: profile {spec.profile} is not virtual; there are {known}")
             self.devices[name] = PROFILES[spec.profile](spec, wiring)
-        self._clock = SlotClock(1.0 / bus.rate, wiring.now())
+        self._clock = SlotClock(1.0 / bus.rate, time.time())
         self.reading = Reading(position=0.0)
 
     def __enter__(self) -> VirtualBench:
@@ -95,7 +95,7 @@ class VirtualBench:
         for cob_id, handler in self._subscriptions():
             self.network.subscribe(cob_id, handler)
         with self._lock:
-            self._clock = SlotClock(1.0 / self.bus.rate, time.monotonic())
+            self._clock = SlotClock(1.0 / self.bus.rate, time.time())
             for device in self.devices.values():
                 device.power_on()
             self._period()
@@ -158,7 +158,8 @@ class VirtualBench:
 
     def _on_sync(self, cob_id: int, data: bytearray, timestamp: float) -> None:
         with self._lock, self._watched():
-            for _ in range(self._clock.sync(time.monotonic()) - 1):
+            # By the time at which the interface received it: a SYNC that had to wait for this thread is not late.
+            for _ in range(self._clock.sync(timestamp or time.time()) - 1):
                 self._period()
             for device in self.devices.values():
                 device.take_over()
@@ -175,7 +176,7 @@ class VirtualBench:
         while not self._ending.wait(tick):
             with self._lock, self._watched():
                 now = time.monotonic()
-                for _ in range(self._clock.overdue(now, patience)):
+                for _ in range(self._clock.overdue(time.time(), patience)):
                     self._period()
                 for device in self.devices.values():
                     device.watch(now)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 NAN = math.nan
-JITTER = 0.9  # share of a period by which a SYNC may come late without a period being counted as missed
+JITTER = 0.98  # share of a period by which a SYNC may come late without a period being counted as missed
 DRIFT = 1e-3  # share of a SYNC's lateness that is taken for a difference of the two clocks
 
 
