@@ -32,6 +32,7 @@ class Parameter:
     has no such value of its own. ``free`` says whether a fit may move it unless a model file says otherwise.
     ``required`` marks a base parameter for which no default is sensible: a model file must give it. ``nuisance``
     marks one that only smooths a law where it has a corner: no data sheet tells it, a diagnosis fits it along.
+    ``observed`` names what of a record shows the value by itself: "resolution", the step between position readings.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Parameter:
     free: bool = True
     required: bool = False
     nuisance: bool = False
+    observed: str | None = None
 
     def __post_init__(self) -> None:
         low, high = self.bounds

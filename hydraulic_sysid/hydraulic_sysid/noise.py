@@ -34,6 +34,22 @@ def resolution(signal: ArrayLike) -> float:
     return float(steps.min()) if steps.size else 0.0
 
 
+def code_step(signal: ArrayLike) -> float:
+    """The step between the codes of a rounded signal ``(N,)`` to a small part of it; 0 where it was not rounded.
+
+    The values lie on a lattice; its step is the slope of the values over their number on it, which the digits that
+    a text file leaves out hardly change.
+    """
+    values = np.unique(np.asarray(signal, dtype=float))
+    step = resolution(values)
+    if not step > 0.0 or values.size < 3:
+        return 0.0
+    number = np.concatenate(([0.0], np.cumsum(np.round(np.diff(values) / step))))
+    slope, start = np.polyfit(number, values, 1)
+    off = values - slope * number - start
+    return float(slope) if float(np.max(np.abs(off))) < 0.1 * slope else 0.0
+
+
 def noise_floor(signal: ArrayLike) -> float:
     """Standard deviation of the white measurement noise in a signal ``(N,)``, in the signal's unit.
 

@@ -124,10 +124,7 @@ def fit_pieces(
     values = {k: model.value(k) for k in keys}
     scales = {k: scale(model, k) for k in keys}
     shooting = Shooting(plant, pieces)
-    try:
-        return _minimise(shooting, model, values, scales, settings, progress)
-    finally:
-        shooting.close()
+    return _minimise(shooting, model, values, scales, settings, progress)
 
 
 def scale(model: Model, key: str) -> float:

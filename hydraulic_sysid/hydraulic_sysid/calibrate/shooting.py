@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,16 +59,12 @@ class Shooting:
         self.starts = [p.states.copy() for p in self.pieces]
         self.misfit = 1.0
         self._unseen = [_unseen(plant, p) for p in self.pieces]
-        self._pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+        self._pool = _workers(workers or os.cpu_count() or 1)
 
     @property
     def guesses(self) -> bool:
         """Whether any start has pressures that were not measured."""
         return any(bool(u.any()) for u in self._unseen)
-
-    def close(self) -> None:
-        """End the worker threads."""
-        self._pool.shutdown()
 
     def residuals(self, values: Mapping[str, float], starts: Sequence[Array] | None = None) -> list[Array]:
         """(S, m) per record, measured − simulated over noise with the starts' priors appended."""
@@ -158,6 +154,12 @@ class Shooting:
         basis, triangle = np.linalg.qr(jacobian)
         back = -np.linalg.solve(triangle, basis.transpose(0, 2, 1))
         return Linear(base, basis, back)
+
+
+@lru_cache(maxsize=4)
+def _workers(number: int) -> ThreadPoolExecutor:
+    """The threads that all shootings of a process share; simulation holds no lock."""
+    return ThreadPoolExecutor(number)
 
 
 def _unseen(plant: Plant, pieces: Pieces) -> NDArray[np.bool_]:

@@ -16,8 +16,8 @@ from .chord import refit
 from .diagnosis import DiagnosisError, finished
 from .document import added_document
 from .errors import parameter_errors
+from .hints import hints
 from .levels import level, material
-from .lines import spectral_lines
 from .pieces import split
 from .screen import screen
 from .search import Found, Search, Trial
@@ -54,11 +54,11 @@ def add(
     model.with_effect(effect).check_complete()
     try:
         parts = split(records, held_out, Plant(model), settings.length)
-        search = Search(parts, settings, say, spectral_lines)
+        search = Search(parts, settings, say, hints)
         say("fitting the model as it is")
         base = search.stage(model)
         say(f"looking where {effect} begins")
-        prospects = screen(base.anchor, [model.library[effect]], spectral_lines(base.anchor))
+        prospects = screen(base.anchor, [model.library[effect]], hints(base.anchor))
         if not prospects:
             raise DiagnosisError(f"{effect} changes nothing in these records: they do not excite it")
         done = refit(base.anchor, base.model.with_effect(effect), prospects[0].start)

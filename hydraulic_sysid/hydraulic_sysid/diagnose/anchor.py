@@ -116,7 +116,16 @@ def fitted(
     """The model with its parameters fitted to the fitted pieces."""
     settings = settings or Settings()
     done = fit_pieces(model, Plant(model), split.to_fit, keys_of(model), settings, progress)
-    return model.with_values(done.values, source="fitted")
+    return model.with_values(within(model, done.values), source="fitted")
+
+
+def within(model: Model, values: Mapping[str, float]) -> dict[str, float]:
+    """The values within the library's bounds, which rounding may leave by a little."""
+    found = {}
+    for key, value in values.items():
+        low, high = model.parameter(key).bounds
+        found[key] = min(max(value, low), high)
+    return found
 
 
 def anchor(model: Model, split: Split) -> Anchor:

@@ -52,11 +52,31 @@ def subsystem(effect: Effect) -> str:
     return slots.SLOTS[effect.slot].subsystem
 
 
-def probes(effect: Effect, lines: tuple[float, ...] = ()) -> Iterator[list[Probe]]:
-    """Groups of probes, one group per shape: each of its members moves one parameter off its null value.
+@dataclass(frozen=True)
+class Hints:
+    """What records show by themselves: ``lines`` [Hz] in what a model leaves, and the position's ``resolution`` [m].
 
-    ``lines`` [Hz]: frequencies at which something happens in the records; shapes in Hz are tried there too.
+    Shapes in Hz are tried at the lines too; a parameter that is ``observed`` is tried at what was seen, and stays.
     """
+
+    lines: tuple[float, ...] = ()
+    resolution: float = 0.0
+
+
+def observed(effect: Effect) -> bool:
+    """Whether the records show the effect's size by themselves."""
+    return any(p.observed for p in effect.parameters)
+
+
+def probes(effect: Effect, hints: Hints) -> Iterator[list[Probe]]:
+    """Groups of probes, one group per shape: each of its members moves one parameter off its null value."""
+    if observed(effect):
+        for p in effect.parameters:
+            if p.observed == "resolution" and p.null is not None and p.bounds[0] < hints.resolution <= p.bounds[1]:
+                key = f"{effect.name}.{p.name}"
+                yield [Probe({key: hints.resolution}, key, p.null)]
+        return
+    lines = hints.lines
     shape = [p for p in effect.parameters if p.null is None]
     moved = [p for p in effect.parameters if p.null is not None and p.free]
     grids = [_grid(p, lines) for p in shape]

@@ -19,7 +19,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.calibrate.estimate import scale
 from hydraulic_sysid.calibrate.steps import bounded_step
 
-from .anchor import Anchor, inner, project
+from .anchor import Anchor, inner, project, within
 from .candidates import between
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def refit(anchor: Anchor, model: Model, start: Mapping[str, float], most_steps: 
         if gain < _FLAT:
             break
     costs = _settled(anchor, plant, values, starts, raw)
-    done = model.with_values(_within(model, values), source="fitted")
+    done = model.with_values(within(model, values), source="fitted")
     return Refit(done, costs, *_sums(anchor, costs), tuple(own))
 
 
@@ -143,15 +143,6 @@ def _settled(
         starts = [np.where(c[:, None], n, s) for s, n, c in zip(starts, there, better, strict=True)]
         raw = [np.where(c[:, None], n, r) for r, n, c in zip(raw, again, better, strict=True)]
     return costs
-
-
-def _within(model: Model, values: Mapping[str, float]) -> dict[str, float]:
-    """The values within the library's bounds, which rounding may leave by a little."""
-    found = {}
-    for key, value in values.items():
-        low, high = model.parameter(key).bounds
-        found[key] = min(max(value, low), high)
-    return found
 
 
 def _sums(anchor: Anchor, costs: list[Array]) -> tuple[float, float]:

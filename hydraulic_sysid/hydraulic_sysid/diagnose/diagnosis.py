@@ -18,8 +18,8 @@ from hydraulic_sysid.records import Record
 from . import verdict
 from .document import document
 from .errors import Known, parameter_errors
+from .hints import hints
 from .levels import Level
-from .lines import spectral_lines
 from .pieces import split
 from .rivals import rivals
 from .search import Found, Search, Stage
@@ -65,7 +65,7 @@ def diagnose(
         raise DiagnosisError("there is no record to diagnose")
     try:
         parts = split(records, held_out, Plant(model), settings.length)
-        found = Search(parts, settings, say, spectral_lines).run(model)
+        found = Search(parts, settings, say, hints).run(model)
     except (SegmentError, CalibrationError) as error:
         raise DiagnosisError(str(error)) from None
     others = {name: rivals(name, stage, found.final.level) for name, stage in found.rivals.items()}

@@ -204,7 +204,7 @@ def _subsystem(found: Found, kind: str, shapes: Sequence[Shape], balances: dict[
     if shapes and shapes[0].share > 0.5:
         return shapes[0].subsystem
     if balances and balances.get("subsystem"):
-        return str(balances["subsystem"][0]["subsystem"])
+        return str(balances["subsystem"][0]["name"])
     return shapes[0].subsystem if shapes else None
 
 

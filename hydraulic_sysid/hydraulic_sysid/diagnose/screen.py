@@ -19,7 +19,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.calibrate.steps import bounded_step
 
 from .anchor import Anchor, inner, project
-from .candidates import Probe, between, inverse, probes
+from .candidates import Hints, Probe, between, inverse, observed, probes
 
 Array = NDArray[np.float64]
 
@@ -35,10 +35,10 @@ class Prospect:
     start: dict[str, float]
 
 
-def screen(anchor: Anchor, effects: Sequence[Effect], lines: tuple[float, ...] = ()) -> list[Prospect]:
+def screen(anchor: Anchor, effects: Sequence[Effect], hints: Hints) -> list[Prospect]:
     """All candidates, the most promising first; gains of the fitted pieces, half of which are looked at if many."""
     part, share = sample(anchor)
-    found = [_prospect(part, effect, lines, share) for effect in effects]
+    found = [_prospect(part, effect, hints, share) for effect in effects]
     return sorted((f for f in found if f is not None), key=lambda f: -f.gain)
 
 
@@ -54,10 +54,10 @@ def sample(anchor: Anchor) -> tuple[Anchor, float]:
     return anchor.some(chosen), sum(int(c.sum()) for c in chosen) / max(total, 1)
 
 
-def _prospect(anchor: Anchor, effect: Effect, lines: tuple[float, ...], share: float) -> Prospect | None:
+def _prospect(anchor: Anchor, effect: Effect, hints: Hints, share: float) -> Prospect | None:
     plant = Plant(anchor.model.with_effect(effect.name))
     best: Prospect | None = None
-    for group in probes(effect, lines):
+    for group in probes(effect, hints):
         found = _predict(anchor, plant, effect, group)
         if found is not None and (best is None or found.gain > best.gain):
             best = found
@@ -74,6 +74,8 @@ def _predict(anchor: Anchor, plant: Plant, effect: Effect, group: list[Probe]) -
         except SimulationError:
             return None
         columns.append([r - lin.raw for r, lin in zip(raw, linear, strict=True)])
+    if observed(effect):
+        return _as_observed(anchor, effect, group[0], columns[0])
     stacked = project(linear, [np.stack([c[i] for c in columns], axis=-1) for i in range(len(linear))])
     new = inner(anchor.split, stacked, stacked)
     usable = np.diag(new) > 1e-12 * max(float(np.diag(new).max()), 1e-300)
@@ -104,6 +106,14 @@ def _predict(anchor: Anchor, plant: Plant, effect: Effect, group: list[Probe]) -
     for p, amount in zip(group, change[len(anchor.keys) :], strict=True):
         start[p.moved] = between(p.null, p.values[p.moved], float(amount), _parameter(effect, p).default)
     return Prospect(effect, float(gain), start)
+
+
+def _as_observed(anchor: Anchor, effect: Effect, probe: Probe, change: list[Array]) -> Prospect:
+    """The gain of an effect whose size the records show: nothing is left to fit, and nothing to differentiate."""
+    gain = 0.0
+    for lin, c in zip(anchor.linear, change, strict=True):
+        gain += float(np.sum(lin.residual**2) - np.sum(lin.project(lin.raw + c) ** 2))
+    return Prospect(effect, gain, dict(probe.values))
 
 
 def _parameter(effect: Effect, probe: Probe) -> Parameter:

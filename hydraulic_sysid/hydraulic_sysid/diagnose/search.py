@@ -15,7 +15,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.calibrate.estimate import Settings
 
 from .anchor import Anchor, anchor, fitted
-from .candidates import candidates
+from .candidates import Hints, candidates
 from .chord import Refit, refit
 from .levels import Level, level, material, repaired
 from .pieces import Split
@@ -71,10 +71,8 @@ class Found:
 class Search:
     """One search over one split of records."""
 
-    def __init__(
-        self, split: Split, settings: Settings, say: Say, lines: Callable[[Anchor], tuple[float, ...]]
-    ) -> None:
-        self.split, self.settings, self.say, self._lines = split, settings, say, lines
+    def __init__(self, split: Split, settings: Settings, say: Say, hints: Callable[[Anchor], Hints]) -> None:
+        self.split, self.settings, self.say, self._hints = split, settings, say, hints
 
     def stage(self, model: Model, settings: Settings | None = None) -> Stage:
         """Fit a model and linearise it."""
@@ -84,7 +82,7 @@ class Search:
     def explore(self, base: Stage, exclude: Sequence[str] = (), most: int = MOST_REFITS) -> Stage:
         """Screen all candidates on a stage and refit the best."""
         point = base.anchor
-        found = screen(point, [e for e in candidates(point.model) if e.name not in exclude], self._lines(point))
+        found = screen(point, [e for e in candidates(point.model) if e.name not in exclude], self._hints(point))
         if not found:
             return base
         floor = max(PROMISING * found[0].gain, 0.2 * base.level.least)

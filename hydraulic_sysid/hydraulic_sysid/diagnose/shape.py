@@ -7,7 +7,7 @@ that the dynamics between the missing piece and the sensors is that of the model
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,7 +107,7 @@ def _seen(anchor: Anchor) -> dict[str, Array]:
 
 
 def _curve(
-    anchor: Anchor, plant: Plant, effect: Effect, index: int, variable: str, values: Array, base: list[Array],
+    anchor: Anchor, plant: Plant, effect: Effect, index: int, variable: str, values: Array, base: Sequence[Array],
     excess: float,
 ) -> Shape | None:  # fmt: skip
     low, high = (float(np.quantile(values, q)) for q in _RANGE)

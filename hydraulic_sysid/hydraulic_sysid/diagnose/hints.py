@@ -1,4 +1,4 @@
-"""Lines in the spectrum of what a model leaves: frequencies at which something oscillates."""
+"""What records show by themselves: lines in the spectrum of what a model leaves, and the position's resolution."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from hydraulic_sysid.noise import code_step
+
 from .anchor import Anchor
+from .candidates import Hints
 
 Array = NDArray[np.floating]
 
@@ -14,6 +17,13 @@ STANDS_OUT = 30.0  # power of a line over the median around it
 _AROUND = 201  # bins
 _MOST = 2
 _SLOWEST = 2.0  # Hz, slower is drift within a piece
+
+
+def hints(anchor: Anchor) -> Hints:
+    """Lines, and the step between position readings that all records share (0 where they have none)."""
+    steps = [code_step(p.record["position"]) for p in anchor.split.pieces]
+    shared = float(np.median(steps)) if max(steps) < 1.01 * min(steps) else 0.0
+    return Hints(spectral_lines(anchor), shared)
 
 
 def spectral_lines(anchor: Anchor) -> tuple[float, ...]:
