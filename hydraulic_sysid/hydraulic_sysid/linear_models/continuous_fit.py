@@ -98,8 +98,10 @@ def _model(
     size = scale ** np.concatenate(
         (np.arange(1, order.free_poles + 1), np.arange(n - m, n + 1), [n] if problem.constant else [])
     )
-    joint = np.hstack((point.jacobian, point.columns))
+    joint = _without_states(np.hstack((point.jacobian, point.columns)), point.alpha.size + problem.shared)
     lengths = np.linalg.norm(joint, axis=0)
+    if not lengths.all():
+        raise IdentificationError("the record says nothing about some coefficients: lower the order")
     _, singular, right = np.linalg.svd(joint / lengths, full_matrices=False)
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
     if condition > 1e12:
@@ -109,7 +111,7 @@ def _model(
         )
     samples = point.residual.size
     weights = (right.T / singular) / lengths[:, None]
-    variance = point.cost / (samples - joint.shape[1])
+    variance = point.cost / (samples - point.alpha.size - point.columns.shape[1])
     errors = np.sqrt(variance * np.sum(weights**2, axis=1))[: size.size]
     bounds = np.cumsum([y.size for y in problem.outputs])[:-1]
     noise, one_step = fit_noise(np.split(point.residual, bounds))
@@ -131,3 +133,15 @@ def _model(
         method=method,
         converged=converged,
     )
+
+
+def _without_states(joint: Array, own: int) -> Array:
+    """The first ``own`` columns less what the others, the initial states', explain of them.
+
+    States that die away within a sample have nearly equal columns: these say nothing about the model itself.
+    """
+    model, states = joint[:, :own], joint[:, own:]
+    lengths = np.linalg.norm(states, axis=0)
+    left, singular, _ = np.linalg.svd(states / np.where(lengths > 0.0, lengths, 1.0), full_matrices=False)
+    basis = left[:, singular > 1e-10 * singular[0]]
+    return model - basis @ (basis.T @ model)
