@@ -12,6 +12,7 @@ from hydraulic_sysid.calibrate.estimate import CalibrationError, Settings
 from hydraulic_sysid.calibrate.segments import SegmentError
 from hydraulic_sysid.records import Record
 
+from .anchor import bounded
 from .chord import refit
 from .diagnosis import DiagnosisError, finished
 from .document import added_document
@@ -52,6 +53,7 @@ def add(
     if effect in model.effects:
         raise DiagnosisError(f"{effect} is on already; calibrate fits its parameters")
     model.with_effect(effect).check_complete()
+    model = bounded(model)
     try:
         parts = split(records, held_out, Plant(model), settings.length)
         search = Search(parts, settings, say, hints)

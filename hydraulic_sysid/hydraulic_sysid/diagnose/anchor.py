@@ -18,6 +18,7 @@ from .pieces import Split
 
 Array = NDArray[np.float64]
 
+SCATTER = 2.0  # factor by which a plant may be off a data sheet that states no bounds
 _RESTS = 3  # times that the starts of pieces are moved to where they fit best
 
 
@@ -105,6 +106,19 @@ def project(linear: Sequence[Linear], columns: Sequence[Array]) -> list[Array]:
 def keys_of(model: Model) -> list[str]:
     """What a diagnosis fits: the free parameters and those that smooth corners."""
     return list(dict.fromkeys((*model.free_keys(), *model.nuisance_keys())))
+
+
+def bounded(model: Model) -> Model:
+    """The model with bounds on free base parameters whose file gives none: half to twice their value.
+
+    While an effect is missing, a fit would else bend a mass or a flow to many times what a data sheet says.
+    """
+    for key in model.free_keys():
+        own = model.entries.get(key)
+        if "." not in key and own is not None and own.bounds is None and own.value > 0.0:
+            low, high = model.parameter(key).bounds
+            model = model.with_entry(key, bounds=(max(low, own.value / SCATTER), min(high, own.value * SCATTER)))
+    return model
 
 
 def fitted(

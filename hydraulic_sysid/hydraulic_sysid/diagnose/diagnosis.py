@@ -16,6 +16,7 @@ from hydraulic_sysid.locate import LocateError, locate
 from hydraulic_sysid.records import Record
 
 from . import verdict
+from .anchor import bounded
 from .document import document
 from .errors import Known, parameter_errors
 from .hints import hints
@@ -63,6 +64,7 @@ def diagnose(
     settings = settings or Settings()
     if not records:
         raise DiagnosisError("there is no record to diagnose")
+    model = bounded(model)
     try:
         parts = split(records, held_out, Plant(model), settings.length)
         found = Search(parts, settings, say, hints).run(model)

@@ -28,6 +28,7 @@ NEAR = 0.7  # of the best gain, from which a refit is finished
 MOST_EFFECTS = 3
 NEEDED = 0.02  # of all that was repaired, which an effect must repair beside the others to stay
 MOST_SWAPS = 3
+HOPELESS = 0.6  # of what noise does not explain: where less is repaired, exchanging effects will not do either
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended
 
 Say = Callable[[str], None]
@@ -146,7 +147,7 @@ class Search:
             if len(added) == 1:
                 rivals[name] = base
                 break
-            without = self.stage(stage.model.without_effect(name))
+            without = self.stage(stage.model.without_effect(name), replace(self.settings, most_steps=LAST_STEPS))
             lost = without.level.total - stage.level.total
             if not material(without.level, stage.level) or lost < NEEDED * (base.level.total - stage.level.total):
                 self.say(f"leaving out {name}")
@@ -155,6 +156,8 @@ class Search:
                 continue
             without = self.explore(without, most=MOST_REFITS // 2)
             rivals[name] = without
+            if repaired(base.level, stage.level) < HOPELESS:
+                continue
             other = self.finish(without)
             if (
                 other is not None

@@ -1,4 +1,4 @@
-"""The half of the demo that needs no graph: identify, compare, and one page for both."""
+"""The half of the demo that needs no graph: identify, compare, diagnose, and one page for all."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
+from hydraulic_sim.model_file import save_model
 from hydraulic_sysid import identification, results
 from hydraulic_sysid.compare import ComparisonError, Settings, compare
+from hydraulic_sysid.diagnose import DiagnosisError, diagnose
 from hydraulic_sysid.linear_models import IdentificationError
 from hydraulic_sysid.records import Record, RecordError, TimeError, read_records
 from hydraulic_sysid.report import write_page
@@ -16,27 +19,33 @@ from hydraulic_sysid.report import write_page
 from .errors import DemoError
 from .online import Steps
 
+MODEL = "model.yaml"
+"""The model with what was missing, in the folder of the run."""
 MOST_MISSING = 0.01
 """Share of a bag's samples that the demo interpolates without giving up."""
+
+MOST_MISSING_OVER_CAN = 0.05
+"""The same for a plant in real time: a cycle that it misses is lost, where the simulator makes up for it."""
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """The two result documents (None where one could not be made, with the reason) and the page."""
+    """The result documents (None where one could not be made, with the reason) and the page."""
 
     identified: dict[str, Any] | None
     compared: dict[str, Any]
+    diagnosed: dict[str, Any]
     page: Path
     left_out: str = ""
 
 
-def read_bag(bag: Path, steps: Steps) -> list[Record]:
+def read_bag(bag: Path, steps: Steps, most: float = MOST_MISSING) -> list[Record]:
     """Records of a bag that was just made.
 
     Samples are missing where the machine held the plant or the recorder up. A few are interpolated, and the user is
     told; a record of the user's own is not treated so, since there a gap may mean something.
 
-    :raises DemoError: more than `MOST_MISSING` of the samples are missing, or the bag is no record.
+    :raises DemoError: more than the share ``most`` of the samples is missing, or the bag is no record.
     """
     try:
         return read_records(bag)
@@ -50,16 +59,16 @@ def read_bag(bag: Path, steps: Steps) -> list[Record]:
         raise DemoError("read the bag", str(error)) from None
     missing = sum(map(len, even)) - sum(map(len, pieces))
     share = f"{missing} of {sum(map(len, even))} samples of {bag.name} are missing"
-    if missing > MOST_MISSING * sum(map(len, even)):
+    if missing > most * sum(map(len, even)):
         raise DemoError("read the bag", f"{share} (first: {problem})", "is the machine busy? Try again, or --quick")
     steps.say(f"{share}: interpolated")
     return even
 
 
 def analyse(records: list[Record], held_out: list[Record], model: Model, out: Path, steps: Steps) -> Analysis:
-    """Identify on ``records`` (validated on ``held_out``, or on the last fifth), compare the model with all of them.
+    """Identify on ``records`` (validated on ``held_out``, or on the last fifth); compare the model with all of them.
 
-    Raises `DemoError`.
+    Then say what the model lacks, and write the model that has it. Raises `DemoError`.
     """
     steps.begin("identify", 2.0)
     identified, left_out = None, ""
@@ -80,7 +89,15 @@ def analyse(records: list[Record], held_out: list[Record], model: Model, out: Pa
         raise DemoError("compare", str(error), "give records with drive and position that are long enough") from None
     results.write_result(out, compared)
     steps.done()
+    steps.begin("diagnose", 10.0 + 5.0 * len(every))
+    try:
+        diagnosis = diagnose(model, every, progress=lambda _: steps.tick())
+    except (DiagnosisError, SimulationError) as error:
+        raise DemoError("diagnose", str(error), "give records with drive and position that are long enough") from None
+    results.write_result(out, diagnosis.result)
+    save_model(diagnosis.model, out / MODEL)
+    steps.done()
     steps.begin("report", 2.0)
     page = write_page(out, results.read_folder(out))
     steps.done()
-    return Analysis(identified, compared, page, left_out)
+    return Analysis(identified, compared, diagnosis.result, page, left_out)

@@ -150,12 +150,12 @@ def _run(options: argparse.Namespace, console: Console) -> int:
             for name in ("chirp", "multisine")
         ]
         as_built = Path(str(files / "models" / "as_built.yaml"))
-        console.print(
-            f"exciting a simulated actuator, comparing it with {model.name}; results in {out}", soft_wrap=True
-        )
+        what = "a simulated actuator" + (" behind virtual CAN devices" if options.plant == "can" else "")
+        console.print(f"exciting {what}, comparing it with {model.name}; results in {out}", soft_wrap=True)
         with ProgressSteps(console, 70.0 if kind == "full" else 35.0) as steps:
             bags = online.run(options.plant, as_built, experiments, out, steps)
-            records, held_out = (offline.read_bag(bag, steps) for bag in bags)
+            most = offline.MOST_MISSING_OVER_CAN if options.plant == "can" else offline.MOST_MISSING
+            records, held_out = (offline.read_bag(bag, steps, most) for bag in bags)
             analysis = offline.analyse(records, held_out, model, out, steps)
     _print(analysis, console)
     console.print(f"\n{time.monotonic() - begun:.0f} s. Open the report: [bold]{analysis.page}[/bold]", soft_wrap=True)
@@ -195,6 +195,15 @@ def _print(analysis: offline.Analysis, console: Console) -> None:
     if analysis.left_out:
         console.print(analysis.left_out)
     console.print(compared["verdict"]["text"])
+    diagnosed = analysis.diagnosed
+    levels = [diagnosed["error"]["before"], *diagnosed["steps"]]
+    names = ["as it is", *(f"+ {s['name']}" for s in diagnosed["steps"])]
+    table = Table(title="diagnosis: residual over noise, held out (1: an exact model)", title_justify="left")
+    for name in names:
+        table.add_column(name, justify="right")
+    table.add_row(*(number(at["held_out"]) for at in levels))
+    console.print(table)
+    console.print(diagnosed["verdict"]["text"])
 
 
 def _cell(figures: dict[str, Any] | None, unit: str) -> str:

@@ -1,0 +1,132 @@
+"""The parts of the diagnosis that can be tested apart; what it finds is tested in tests/hidden_effects."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.diagnose import DiagnosisError, add, diagnose
+from hydraulic_sysid.diagnose.anchor import SCATTER, bounded
+from hydraulic_sysid.diagnose.candidates import Hints, between, candidates, inverse, probes
+from hydraulic_sysid.diagnose.levels import Level, material, repaired
+from hydraulic_sysid.diagnose.pieces import split
+from hydraulic_sysid.diagnose.shapes import FILES
+from hydraulic_sysid.noise import code_step
+from hydraulic_sysid.records import Record
+
+DT = 1e-3
+
+
+def standing(seconds: float, name: str = "r") -> Record:
+    """Nothing but noise."""
+    n = round(seconds / DT)
+    draw = np.random.default_rng(3)
+    return Record.sampled(
+        name,
+        DT,
+        {
+            "drive": np.zeros(n),
+            "position": 2e-5 * draw.standard_normal(n),
+            "pressure_a": 7.15e6 + 1.5e4 * draw.standard_normal(n),
+            "pressure_b": 7.15e6 + 1.5e4 * draw.standard_normal(n),
+        },
+    )
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model("sample_bench")
+
+
+def test_every_third_stretch_is_held_out_and_shifts_from_record_to_record(model) -> None:
+    parts = split([standing(20.0, "a"), standing(20.0, "b")], [], Plant(model), 0.5)
+    shares = [float(f.mean()) for f in parts.fitted]
+    assert all(0.6 <= s <= 0.72 for s in shares)
+    assert not np.array_equal(parts.fitted[0], parts.fitted[1])
+    assert [len(p.starts) for p in parts.to_fit] == [int(f.sum()) for f in parts.fitted]
+
+
+def test_named_records_are_held_out_whole(model) -> None:
+    parts = split([standing(5.0, "a")], [standing(5.0, "b")], Plant(model), 0.5)
+    assert parts.fitted[0].all() and not parts.fitted[1].any()
+    assert [p.record.name for p in parts.to_fit] == ["a"]
+
+
+def test_candidates_are_the_library_without_what_is_on_or_cannot_act(model) -> None:
+    names = {e.name for e in candidates(model)}
+    assert names == {e.name for e in model.library.values() if not e.always_on} - set(model.effects)
+    assert not {"supply_droop"} & {e.name for e in candidates(model.with_effect("supply_droop"))}
+
+
+def test_every_candidate_has_a_probe_off_its_null_value_within_bounds(model) -> None:
+    for effect in candidates(model):
+        groups = list(probes(effect, Hints(lines=(33.0,), resolution=1e-4)))
+        assert groups, effect.name
+        for group in groups:
+            for probe in group:
+                assert probe.values[probe.moved] != probe.null, effect.name
+                for key, value in probe.values.items():
+                    low, high = model.with_effect(effect.name).entry(key).bounds
+                    assert low <= value <= high, key
+
+
+def test_lines_are_tried_where_a_shape_is_a_frequency(model) -> None:
+    ripple = model.library["pump_ripple"]
+    tried = {p.values["pump_ripple.frequency"] for g in probes(ripple, Hints(lines=(33.0,))) for p in g}
+    assert 33.0 in tried
+    assert 33.0 not in {p.values["pump_ripple.frequency"] for g in probes(ripple, Hints()) for p in g}
+
+
+def test_an_observed_parameter_is_tried_at_what_was_seen_alone(model) -> None:
+    quantised = model.library["sensor_quantisation"]
+    assert [g[0].values for g in probes(quantised, Hints(resolution=3e-4))] == [{"sensor_quantisation.step": 3e-4}]
+    assert list(probes(quantised, Hints())) == []
+
+
+def test_half_the_influence_of_a_frequency_is_twice_the_frequency() -> None:
+    assert inverse(1000.0, 80.0) and not inverse(0.0, 0.02)
+    assert between(1000.0, 80.0, 0.5, 80.0) == 160.0
+    assert between(0.0, 0.04, 0.5, 0.02) == 0.02
+    assert between(1.0, 1.04, 0.5, 1.03) == pytest.approx(1.02)
+
+
+def test_a_gain_must_show_on_fitted_and_on_held_out_pieces() -> None:
+    before = Level(1.2e5, 6e4, 100_000, 50_000)
+    assert material(before, Level(1.1e5, 5.5e4, 100_000, 50_000))
+    assert not material(before, Level(1.1e5, 6.1e4, 100_000, 50_000))  # fitted away, not confirmed
+    assert not material(before, Level(1.2e5, 5.5e4, 100_000, 50_000))
+    assert not material(before, Level(1.2e5 - 30.0, 6e4 - 15.0, 100_000, 50_000))  # chance has more
+    assert repaired(before, Level(1.0e5, 5.0e4, 100_000, 50_000)) == pytest.approx(1.0)
+    assert before.excess == pytest.approx(3e4)
+
+
+def test_free_base_parameters_without_bounds_get_a_data_sheet_s_scatter(model) -> None:
+    bench = bounded(load_model("moog_mcr_m_1002_bench"))
+    assert bench.entry("moving_mass").bounds == (500.0 / SCATTER, 500.0 * SCATTER)
+    assert bounded(model).entry("moving_mass").bounds == (400.0, 600.0)  # the file's own
+
+
+def test_the_step_of_codes_survives_what_a_text_file_rounds_away() -> None:
+    step = 0.000255091218
+    x = np.round(np.linspace(-0.2, 0.2, 5000) / step) * step
+    assert code_step(np.round(x, 6)) == pytest.approx(step, rel=1e-6)
+    assert code_step(np.random.default_rng(0).standard_normal(500)) == 0.0
+    assert code_step(np.zeros(50)) == 0.0
+
+
+def test_shapes_are_effects_of_their_own_and_none_of_the_library(model) -> None:
+    assert FILES
+    for file in FILES:
+        assert file.stem not in model.library
+
+
+def test_unusable_input_is_named(model) -> None:
+    with pytest.raises(DiagnosisError, match="no record"):
+        diagnose(model, [])
+    with pytest.raises(DiagnosisError, match="coulomb_friction is on already"):
+        add(model, "coulomb_friction", [standing(2.0)])
+    bare = Record.sampled("bare", DT, {"drive": np.zeros(2000)})
+    with pytest.raises(DiagnosisError, match="bare: no channel 'position'"):
+        diagnose(model, [bare])

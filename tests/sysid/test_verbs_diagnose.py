@@ -1,0 +1,81 @@
+"""diagnose and add on the records that come with the project, which an independent plant made (a hidden dead band)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.verbs.add import main as add_main
+from hydraulic_sysid.verbs.diagnose import main as diagnose_main
+
+RECORDS = Path(__file__).parents[2] / "examples" / "sample_bench"
+pytestmark = pytest.mark.timeout(600)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("diagnosed")
+    assert diagnose_main(["--model", "sample_bench", "--record", str(RECORDS), "--apply", "--out", str(out)]) == 0
+    return out
+
+
+def test_the_hidden_dead_band_is_found_and_its_width_too(run: Path) -> None:
+    found = json.loads((run / "diagnose.json").read_text())
+    assert found["schema"] == "hydraulic_sysid.diagnose/1"
+    assert found["verdict"]["kind"] == "missing"
+    assert found["verdict"]["effects"] == ["valve_deadband"]
+    assert found["verdict"]["subsystem"] == "valve"
+    first = found["effects"][0]
+    assert (first["name"], first["rank"], first["found"]) == ("valve_deadband", 1, True)
+    assert first["error_before"] > 10.0 > 1.3 > first["error_after"]
+    width = first["parameters"][0]
+    assert width["value"] == pytest.approx(0.03, rel=0.02) and width["standard_error"] > 0.0
+    assert [s["name"] for s in found["steps"]] == ["valve_deadband"]
+    assert len(found["effects"]) == len({e["name"] for e in found["effects"]}) > 30
+    assert {b["name"] for b in found["balances"]} >= {"force", "flow_a", "flow_b"}
+    assert set(found["noise_floor"]) == {"position", "pressure_a", "pressure_b"}
+
+
+def test_why_not_the_runner_up_is_said_with_its_figure(run: Path) -> None:
+    found = json.loads((run / "diagnose.json").read_text())
+    second = found["alternatives"]["valve_deadband"][0]
+    assert second["told_apart"] and second["error_after"] > 5.0
+    assert f"Why not {second['name']}" in found["verdict"]["text"]
+
+
+def test_the_model_that_was_written_has_the_effect_and_says_where_from(run: Path) -> None:
+    model = load_model(run / "model.yaml")
+    assert "valve_deadband" in model.effects
+    assert model.entry("valve_deadband.width").standard_error
+    line = model.history[-1]
+    assert line["change"] == "added valve_deadband" and line["error_after"] < line["error_before"]
+
+
+def test_the_page_shows_what_the_document_holds(run: Path) -> None:
+    page = (run / "report.html").read_text()
+    for word in ("The error falls", "Before and after", "Why not another", "valve_deadband"):
+        assert word in page
+
+
+def test_a_model_is_never_overwritten(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert diagnose_main(["--model", "sample_bench", "--record", str(RECORDS), "--apply", "--out", str(run)]) == 2
+    assert "never overwritten" in capsys.readouterr().err
+
+
+def test_add_fits_an_effect_and_says_whether_the_data_bear_it_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    records = [str(p) for p in sorted(RECORDS.glob("*.csv.gz"))]
+    command = ["--model", "sample_bench", "--record", *records[:1], "--holdout", records[1], "--json"]
+    assert add_main(["valve_deadband", *command, "--out", str(tmp_path / "right")]) == 0
+    done = json.loads(capsys.readouterr().out)
+    assert done["verdict"]["kind"] == "confirmed"
+    assert [r["name"] for r in done["records"] if r["held_out"]]
+    assert done["error"]["after"]["held_out"] < 0.2 * done["error"]["before"]["held_out"]
+    assert "valve_deadband" in load_model(tmp_path / "right" / "model.yaml").effects
+    assert add_main(["no_such_effect", *command, "--out", str(tmp_path / "none")]) == 2
+    assert "no_such_effect" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
