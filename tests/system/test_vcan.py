@@ -84,7 +84,8 @@ def write_bus(path: Path) -> None:
     bus["channel"], bus["rate"] = CHANNEL, RATE
     bus["master"].update(heartbeat=0.2, lost_after=PATIENCE_S)
     bus["limits"].update(frozen_time=PATIENCE_S, velocity=100.0)
-    bus["monitoring"].update(frames_within=0.95, missed_cycles=500, sync_gap=PATIENCE_S, state_change=PATIENCE_S, heartbeats=60)
+    bus["monitoring"].update(frames_within=0.95, missed_cycles=500, heartbeats=60)
+    bus["monitoring"].update(sync_gap=PATIENCE_S, state_change=PATIENCE_S)
     for node in bus["nodes"].values():
         node["heartbeat"] = 0.5
     valve = bus["nodes"]["valve"]
