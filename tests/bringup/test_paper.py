@@ -14,6 +14,8 @@ import pytest
 from hydraulic_bringup.paper import printed, study
 from hydraulic_bringup.verbs import paper
 
+pytestmark = pytest.mark.timeout(900)  # twenty seconds on an idle machine
+
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], str]:

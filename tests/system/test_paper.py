@@ -16,7 +16,7 @@ from hydraulic_sysid.records import read_records
 
 pytest.importorskip("rclpy")
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = pytest.mark.timeout(900)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any],
     folder = tmp_path_factory.mktemp("paper")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "COLUMNS": "120"}
     command = [sys.executable, "-m", "hydraulic_bringup.verbs.paper", "--quick", "--out", str(folder / "run")]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=380)
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=880)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder / "run", json.loads((folder / "run" / "paper.json").read_text(encoding="utf-8")), done.stdout
 
