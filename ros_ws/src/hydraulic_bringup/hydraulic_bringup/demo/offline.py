@@ -27,9 +27,6 @@ MOST_MISSING = 0.01
 MOST_MISSING_OVER_CAN = 0.05
 """The same for a plant in real time: a cycle that it misses is lost, where the simulator makes up for it."""
 
-MOST_MISSING_OVER_CAN = 0.05
-"""The same for a plant in real time: a cycle that it misses is lost, where the simulator makes up for it."""
-
 
 @dataclass(frozen=True)
 class Analysis:
