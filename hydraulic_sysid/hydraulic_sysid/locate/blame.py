@@ -23,7 +23,8 @@ PARAMETERS = "parameters"
 Bounds = tuple[float, float]
 FOLDS = 4
 BLOCK_SECONDS = 0.5
-_RIDGES = (1e-6, 1e-4, 1e-2)
+_RIDGES = (1e-6, 1e-4, 1e-2, 1e-1, 1.0)
+_SEEN = 0.1  # part of a direction's power outside the fold left out, from which it is fitted
 _LEAST = 10.0  # gain over ln N from which a subsystem gets a share
 _SMALL = 0.1  # and least part of what those before have left
 _TOLD = 0.05  # share from which it is said over what it goes
@@ -74,14 +75,21 @@ class Moments:
         totals = np.full(len(_RIDGES), float(self.square.sum()))
         for k in range(FOLDS):
             train = whole - grams[k]
-            scale = np.sqrt(np.maximum(np.diag(train), 1e-300))
+            # A direction that hardly any but the fold left out has seen cannot be judged: it gets no weight.
+            seen = np.diag(train) > _SEEN * np.diag(whole)
+            scale = np.sqrt(np.where(seen, np.diag(whole), np.inf))
             train /= np.outer(scale, scale)
             target = (all_cross - crosses[k]) / scale
-            limits = low * scale[:bounded], high * scale[:bounded]
+            limits = _times(low, scale[:bounded]), _times(high, scale[:bounded])
             for i, ridge in enumerate(_RIDGES):
                 fitted = _bounded_fit(train + ridge * np.eye(len(train)), target, bounded, *limits) / scale
                 totals[i] += fitted @ (grams[k] @ fitted) - 2.0 * fitted @ crosses[k]
         return float(totals.min())
+
+
+def _times(bound: Array, scale: Array) -> Array:
+    """Bounds in units of the scaled directions; one without any power may do what it likes."""
+    return np.where(np.isfinite(scale), bound * np.where(np.isfinite(scale), scale, 1.0), np.sign(bound))
 
 
 def _bounded_fit(gram: Array, cross: Array, bounded: int, low: Array, high: Array) -> Array:
@@ -143,7 +151,7 @@ def rank(
     """
     owner, over = np.array(subsystems), np.array(variables)
     index = {n: np.flatnonzero(owner == n) for n in dict.fromkeys(subsystems) if n != PARAMETERS}
-    base = np.zeros(0, dtype=np.int64)
+    base: NDArray[np.int64] = np.flatnonzero(owner == "")  # none: the parameters always take part
     box = (len(bounds), *np.array(bounds, dtype=float).reshape(-1, 2).T)
     count = float(measured.count.sum())
     refitted, exact = measured.left(base, *box), twin.left(base, *box)
@@ -164,13 +172,14 @@ def rank(
             break
         by: dict[str, float] = {}
         for name in dict.fromkeys(over[index[best]].tolist()) if won > _TOLD * excess or not ranked else ():
-            part = index[best][over[index[best]] == name]
-            by[name] = max(0.0, gain(np.concatenate((taken, part)), now, now_twin)[0]) / won
+            mine = np.flatnonzero((owner == best) & (over == name))
+            by[name] = max(0.0, gain(np.concatenate((taken, mine)), now, now_twin)[0]) / won
         by = dict(sorted(by.items(), key=lambda item: -item[1]))
         share = min(won / excess, 1.0 - sum(b.share for b in ranked))
         ranked.append(Blame(best, share, alone[best][0] / excess, won, by))
         rest.remove(best)
-        taken, now, now_twin = np.concatenate((taken, index[best])), after, after_twin
+        taken = np.concatenate((taken, index[best]))
+        now, now_twin = after, after_twin
         tried = {n: gain(np.concatenate((taken, index[n])), now, now_twin) for n in rest} if len(ranked) < _MOST else {}
         if not tried:
             break

@@ -43,10 +43,10 @@ def shifted(values: Array, samples: int) -> Array:
     return np.concatenate((np.full(samples, values[0]), values[: values.size - samples]))
 
 
-def lagged(values: Array, dt: float, time: float) -> Array:
-    """First-order lag of a time constant [s], settled at the beginning."""
+def lagged(values: Array, dt: float, time: float, begin: float | None = None) -> Array:
+    """First-order lag of a time constant [s] from ``begin`` on; without it settled on the first value."""
     pole = np.exp(-dt / time)
-    return lfilter([1.0 - pole], [1.0, -pole], values, zi=[values[0] * pole])[0]
+    return lfilter([1.0 - pole], [1.0, -pole], values, zi=[(values[0] if begin is None else begin) * pole])[0]
 
 
 @njit("f8[::1](f8[::1], f8)", cache=True, nogil=True)

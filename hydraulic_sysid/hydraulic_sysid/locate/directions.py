@@ -88,6 +88,7 @@ def _force(s: Signals, k: Knots, waves: Array) -> Family:
     for tent in tents(s.velocity, k.velocity):
         f.add("velocity", force=tent)
     f.add("direction", force=way)
+    f.add("direction", force=np.abs(way))
     for tent in tents(s.position, k.position):
         f.add("position", force=tent)
         f.add("position", force=tent * way)
@@ -194,7 +195,7 @@ def _fluid(s: Signals, k: Knots) -> Family:
         f.add("pressure", flow_a=thin_a * stored_a, flow_b=thin_b * stored_b)
     f.add("rate", flow_a=-s.rate_a, flow_b=-s.rate_b)
     for time in _CREEP:
-        f.add("history", flow_a=-lagged(s.rate_a, s.dt, time), flow_b=-lagged(s.rate_b, s.dt, time))
+        f.add("history", flow_a=-lagged(s.rate_a, s.dt, time, 0.0), flow_b=-lagged(s.rate_b, s.dt, time, 0.0))
     f.add("rate", flow_a=-s.rate_a)
     f.add("rate", flow_b=-s.rate_b)
     model = s.plant.model

@@ -40,7 +40,7 @@ VARIABLES = {
 _LAGS_SECONDS = 0.25
 _SEGMENT = 2.5  # s of a spectrum's segments
 _STANDING = 3.0
-_SIGNAL = 1.0  # signal power over noise power down to which the band reaches
+_TIED = 0.01  # of what is missing: subsystems that explain as much as the best but for this cannot be told apart
 
 
 def balances(studies: Sequence[Study], names: tuple[str, ...], maps: bool) -> list[dict[str, Any]]:
@@ -216,8 +216,16 @@ def subsystems(verdict: Verdict | None) -> list[dict[str, Any]]:
     """Ranked subsystems as plain dictionaries."""
     if verdict is None:
         return []
+    best = max(b.alone for b in verdict.ranked)
     return [
-        {"name": b.subsystem, "share": b.share, "alone": b.alone, "gain": b.gain, "over": b.variables}
+        {
+            "name": b.subsystem,
+            "share": b.share,
+            "alone": b.alone,
+            "gain": b.gain,
+            "over": b.variables,
+            "tied": b.alone >= best - _TIED,
+        }
         for b in verdict.ranked
     ]
 

@@ -25,6 +25,7 @@ from .signals import Signals, signals_of, smoothed, smoothing_windows
 Array = NDArray[np.float64]
 
 _SENSED = ("position", "pressure_a", "pressure_b", "pressure_supply", "spool")
+_EDGE = 0.1  # s at either end of a record, where smoothing filters have one side only
 _STEP = 1e-3  # difference step of a parameter, of its size
 
 
@@ -115,7 +116,8 @@ def moments(
     if "force" in names:
         turns = s.whitener(thin(turning(side.signals, s.data.noise["position"])[:, None], s.factor), (0,))
     given = np.concatenate((s.moved, turns))
-    made = Moments.of(np.concatenate((given, *found)), side.white, s.rate)
+    edge = max(1, int(round(_EDGE * s.rate)))
+    made = Moments.of(np.concatenate((given, *found))[..., edge:-edge], side.white[:, edge:-edge], s.rate)
     return made, [PARAMETERS] * len(given) + subsystems, [""] * len(given) + variables
 
 

@@ -49,7 +49,7 @@ def findings(result: dict[str, Any]) -> list[dict[str, Any]]:
             numbers |= {"over": over[0]["variable"], "explained": over[0]["explained"]}
         found.append({"balance": b["name"], "kind": "violated", "text": text + ".", "numbers": numbers})
     for s in result["subsystem"]:
-        if s["share"] < _WORTH:
+        if s["share"] < _WORTH or _over(result) <= EXPLAINED:
             continue
         best = next(iter(s["over"]), None)
         text = (
@@ -74,7 +74,7 @@ def verdict(result: dict[str, Any]) -> dict[str, str]:
             "text": "These records allow no balance: drive and position alone do not tell forces from flows. "
             "Measure the pressures of both chambers to locate a fault.",
         }
-    over = misfit["parameters_moved"] / misfit["exact_model"]
+    over = _over(result)
     if over <= EXPLAINED:
         return {
             "level": "explained",
@@ -86,4 +86,13 @@ def verdict(result: dict[str, Any]) -> dict[str, str]:
     if not blamed:
         return {"level": level, "text": text + "; no subsystem explains it."}
     parts = [f"{PLACES[s['name']]} ({100.0 * s['share']:.0f} %)" for s in blamed]
-    return {"level": level, "text": f"{text}. It belongs to {' and '.join(parts[:3])}."}
+    text = f"{text}. It belongs to {' and '.join(parts[:3])}."
+    tied = [PLACES[s["name"]] for s in result["subsystem"] if s["tied"] and s is not blamed[0]]
+    if tied and blamed[0]["tied"]:
+        text += f" These records hardly tell that from {' or '.join(tied)}."
+    return {"level": level, "text": text}
+
+
+def _over(result: dict[str, Any]) -> float:
+    """Mean square of the balances, parameters moved, over that of an exact model."""
+    return float(result["misfit"]["parameters_moved"] / result["misfit"]["exact_model"])
