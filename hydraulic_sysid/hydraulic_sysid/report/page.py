@@ -20,6 +20,7 @@ from . import (
     frequency_response_section,
     greybox_section,
     identify_section,
+    next_experiment_section,
     paper_section,
     validate_section,
 )
@@ -38,6 +39,7 @@ SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
     "hydraulic_sysid.frequency_response/1": frequency_response_section.html,
     "hydraulic_sysid.greybox/1": greybox_section.html,
     "hydraulic_sysid.identify/2": identify_section.html,
+    "hydraulic_sysid.next_experiment/1": next_experiment_section.html,
     "hydraulic_sysid.paper/1": paper_section.html,
     "hydraulic_sysid.validate/1": validate_section.html,
 }
