@@ -14,7 +14,8 @@ COMPLETE = "complete"
 OUTSIDE = "outside the library"
 
 UNSEEN = 0.015  # mean square beyond the noise that a noise floor estimated from data may miss
-UNEXPLAINED = 0.1  # of what was to be explained: more than that left is no matter of a law's details
+UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
+STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 LARGE = 1.03  # residual over noise from which something is missing although no effect of the library is
 
 
@@ -31,9 +32,24 @@ def kind_of(found: Found, rivals: Mapping[str, Sequence[Rival]]) -> str:
     final = found.final.level
     if not found.added:
         return OUTSIDE if final.variance > LARGE**2 else COMPLETE
-    if left_over(found) > UNEXPLAINED and final.variance > 1.0 + 2.0 * UNSEEN:
+    allowed = STRAINED if strained(found) else UNEXPLAINED
+    if left_over(found) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
     return TIED if any(not r.told_apart for every in rivals.values() for r in every) else MISSING
+
+
+def strained(found: Found) -> list[str]:
+    """Shape parameters of effects found that ended at a bound: the law had to be bent to its limits to fit."""
+    model = found.final.model
+    keys = []
+    for name in found.added:
+        for p in model.library[name].parameters:
+            key = f"{name}.{p.name}"
+            low, high = model.entry(key).bounds or p.bounds
+            near = 1e-6 * max(abs(p.default), 1e-12)
+            if p.null is None and p.free and not low + near < model.value(key) < high - near:
+                keys.append(key)
+    return keys
 
 
 def sentences(found: Found, rivals: Mapping[str, Sequence[Rival]], kind: str, shapes: Sequence[Shape]) -> str:
