@@ -66,9 +66,14 @@ class Device:
         return self.node is not None
 
     @property
+    def started(self) -> bool:
+        """Whether a master has made it OPERATIONAL; it stays so without the bus."""
+        return self.node is not None and self.node.nmt.state == "OPERATIONAL"
+
+    @property
     def operational(self) -> bool:
         """Whether it exchanges process data."""
-        return self.node is not None and self._connected and self.node.nmt.state == "OPERATIONAL"
+        return self._connected and self.started
 
     def power_on(self) -> None:
         """Boot: stored settings, boot-up message, PRE-OPERATIONAL."""
@@ -228,8 +233,6 @@ class Device:
             if by_sdo:
                 self._asked("sdo write", index, sub)
 
-    # What a subclass makes of it.
-
     def start(self) -> None:
         """Power is on; settings are read, nothing is sent yet."""
 
@@ -287,8 +290,7 @@ class Device:
         if value is None:
             return
         check_write(self.get, self.objects.mappable, index, sub, value)
-        code = self.refuse(index, sub, value)
-        if code:
+        if code := self.refuse(index, sub, value):
             raise canopen.SdoAbortedError(code)
 
     def _stored(self, index: int, sub: int) -> bytes:

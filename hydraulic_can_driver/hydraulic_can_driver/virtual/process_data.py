@@ -62,23 +62,20 @@ class Owner(Protocol):
 class ProcessData:
     """All process data objects of a device, as configured in its dictionary.
 
-    ``done`` is told the number of each frame whose content was taken over.
+    ``done`` is told the number of each frame whose content was taken over. `deadline` [s] is the longest silence of a
+    received one that is tolerated, 0 for any; it holds as well while the device is off the bus.
     """
 
     def __init__(
         self, owner: Owner, network: canopen.Network, lock: threading.RLock, done: Callable[[int], None]
     ) -> None:
         self._owner, self._network, self._lock, self._done = owner, network, lock, done
+        self.deadline = 0.0
         self._sent: list[Mapping] = []
         self._heard: dict[int, Mapping] = {}
         self._waiting: dict[int, tuple[Mapping, bytes]] = {}
         self._due: dict[int, float] = {}
         self._syncs = 0
-
-    @property
-    def deadline(self) -> float:
-        """The longest silence that a received object is configured to tolerate, s; 0 tolerates any."""
-        return max((mapping.timer for mapping in self._heard.values()), default=0.0)
 
     def configure(self, indices: list[int]) -> None:
         """Read the parameters anew; ``indices`` are those of the dictionary."""
@@ -93,6 +90,7 @@ class ProcessData:
                 sent = configured(self._owner.get, *SENT, index - SENT[0] + 1)
                 if sent is not None:
                     self._sent.append(sent)
+        self.deadline = max((mapping.timer for mapping in self._heard.values()), default=0.0)
 
     def close(self) -> None:
         """Hear and send nothing."""

@@ -107,7 +107,7 @@ class Valve(Device):
         if not self.powered:
             return
         silence = self.get(0x2201) * 1e-3
-        for cause, code in self.master.silent(now, self.pdos.deadline, silence, self.operational):
+        for cause, code in self.master.silent(now, self.pdos.deadline, silence, self.started):
             self.fail(cause, code, _COMMUNICATION)
             self._leave_operational()
             return
@@ -143,7 +143,7 @@ class Valve(Device):
 
     def _leave_operational(self) -> None:
         action = self.get(0x1029, 1)
-        if self.operational and action != 1 and self.node is not None:
+        if self.started and action != 1 and self.node is not None:
             self.node.nmt.on_command(0, bytes([2 if action == 2 else 128, self.spec.id]), 0.0)
             self._say("nmt", self.node.nmt.state)
             self.left_operational()
