@@ -56,6 +56,11 @@ class ReferenceRun:
         self.done = t >= self._whole.duration
         return Reference(sample.stamp_ns, position, velocity)
 
+    @property
+    def start_ns(self) -> int:
+        """Stamp at which the trajectory itself began: 0 s of the response."""
+        return self._started_ns + round(self._lead * 1e9)
+
     def response(self) -> Response:
         """What has been played so far, from the trajectory's beginning."""
         rows = np.array(self._rows, dtype=float).reshape(-1, 4)

@@ -122,7 +122,7 @@ def test_nothing_winds_up_while_the_plant_does_not_obey() -> None:
     feed(loop, 10)
     loop.follow(Reference(START, 0.05))
     answers = feed(loop, 5000, first=10, drive=0.0)
-    assert max(abs(a) for a in answers[50:] if a is not None) < 2.0, "5 V proportional and more integral do not pile up"
+    assert max(abs(a) for a in answers[50:] if a is not None) < 3.0, "5 V proportional and more integral do not pile up"
     assert loop.faults[Fault.NOT_OBEYED] > 0
 
 

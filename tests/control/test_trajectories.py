@@ -26,7 +26,7 @@ def sampled(trajectory, before: float = 0.01):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize("kind", SMOOTH)
 @settings(max_examples=12, deadline=None)
 @given(
-    amplitude=st.floats(-0.3, 0.3), frequency=st.floats(0.02, 1.0), velocity=st.floats(0.05, 1.0),
+    amplitude=st.floats(-0.3, 0.3), frequency=st.floats(0.1, 1.0), velocity=st.floats(0.05, 1.0),
     acceleration=st.floats(0.5, 20.0),
 )  # fmt: skip
 def test_what_is_not_refused_is_smooth_and_within_the_limits(

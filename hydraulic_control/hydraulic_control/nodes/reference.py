@@ -101,7 +101,7 @@ class ReferenceNode(ServedNode):
         (self.get_logger().error if failed else self.get_logger().info)(self._end)
         if run is not None and self._table["output"] and not failed:
             try:
-                document = {"kind": run.kind, **run.response().as_document()}
+                document = {"kind": run.kind, "start_ns": run.start_ns, **run.response().as_document()}
                 Path(self._table["output"]).write_text(json.dumps(document) + "\n", encoding="utf-8")
             except OSError as error:
                 self._failed = True

@@ -34,10 +34,10 @@ PARAMETERS = (
     ParameterSpec("travel", _USUAL.travel, "from the start, that breaks it off", "m", 1e-5, 10.0),
     ParameterSpec("time_limit", _USUAL.time_limit, "that breaks it off", "s", 0.1, 600.0),
     ParameterSpec("start_timeout", 30.0, "longest wait for a plant that obeys", "s", 0.1, 3600.0),
+    ParameterSpec("state_timeout", 0.1, "silence of the state that breaks it off", "s", 0.01, 10.0),
     ParameterSpec("output", "", "JSON file for the result; empty: it is only told"),
 )
 STATE_DEPTH = 10
-_STATE_TIMEOUT_S = 0.1
 _OBEYS_WITHIN_S = 0.05
 
 
@@ -50,6 +50,7 @@ class RelayNode(ServedNode):
         names = vars(_USUAL)
         self._relay = Relay(RelaySettings(**{name: values[name] for name in names}))
         self._output, self._patience = values["output"], time.monotonic() + values["start_timeout"]
+        self._timeout = values["state_timeout"]
         self._encode = CommandEncoder(RELAY_NODE)
         self._command = self.create_publisher(JointState, "command", profile("command"))
         self._drive, self._heard = 0.0, time.monotonic()
@@ -60,7 +61,7 @@ class RelayNode(ServedNode):
     def watch(self) -> None:
         """What must happen without a message: notice silence, give up waiting."""
         now = time.monotonic()
-        if self._obeyed_ns is not None and now - self._heard > _STATE_TIMEOUT_S:
+        if self._obeyed_ns is not None and now - self._heard > self._timeout:
             self._relay.abort(f"no state for {now - self._heard:.2f} s")
         elif self._obeyed_ns is None and now > self._patience:
             self._relay.abort("no plant obeyed: is it active and enabled, and nobody else in command?")
