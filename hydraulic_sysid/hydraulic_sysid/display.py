@@ -7,6 +7,7 @@ SHOWN: dict[str, tuple[float, str]] = {
     "m/s": (1e3, "mm/s"),
     "Pa": (1e-6, "MPa"),
     "N": (1e-3, "kN"),
+    "m^3/s": (6e4, "l/min"),
     "V": (1.0, "V"),
     "s": (1.0, "s"),
     "1": (100.0, "%"),

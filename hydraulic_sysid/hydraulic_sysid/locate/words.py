@@ -13,6 +13,7 @@ EXPLAINED = 1.1
 CLOSE = 2.0
 _WORTH = 0.05  # share from which a second subsystem is named
 _VIOLATED = 1.15  # RMS over noise from which a balance is called violated
+_BASIC = ("force", "flow_a", "flow_b")  # of spool and supply few records know
 PLACES = {
     "force": "the forces on the piston",
     "flow": "flow past the valve's lands (leakage)",
@@ -59,7 +60,7 @@ def findings(result: dict[str, Any]) -> list[dict[str, Any]]:
         text += f", mostly over {OVER.get(best, best)}." if best else "."
         numbers = {"share": s["share"], "alone": s["alone"]}
         found.append({"balance": None, "kind": "blame", "subsystem": s["name"], "text": text, "numbers": numbers})
-    for missing in result["not_formed"]:
+    for missing in (m for m in result["not_formed"] if m["name"] in _BASIC):
         text = f"The {missing['name'].replace('_', ' ')} balance cannot be formed: {missing['why']}."
         found.append({"balance": missing["name"], "kind": "not_formed", "text": text, "numbers": {}})
     return found
