@@ -18,7 +18,6 @@ from typing import Any
 import can
 import pytest
 
-from hydraulic_can_driver import master
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus import Address, Bus, SdoWrite
 from hydraulic_can_driver.bus_file import load_bus
@@ -242,12 +241,11 @@ class Rig:
 
 
 @pytest.fixture
-def rig(patient: Bus, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Rig]]:
+def rig(patient: Bus) -> Iterator[Callable[..., Rig]]:
     """`rig(lost_after, missed_cycles=5, ...)`: driver and virtual devices.
 
     `lost_after` [s] is the valve's patience with its master; the others change the monitoring of the patient bus.
     """
-    monkeypatch.setattr(master, "_ANSWER_S", 0.3)  # nobody is far away
     rigs: list[Rig] = []
 
     def build(lost_after: float = 20.0, **monitoring: Any) -> Rig:

@@ -10,6 +10,7 @@ from typing import Any
 import can
 import pytest
 
+from hydraulic_can_driver import master
 from hydraulic_can_driver.cia408 import State
 from hydraulic_can_driver.errors import CanDriverError
 from hydraulic_can_driver.virtual import faults as upset
@@ -34,6 +35,12 @@ STEPS = {
     "init": ("state", "valve", "init", 1),
     "pre-operational": ("nmt", "valve", "PRE-OPERATIONAL", 2),
 }
+
+
+@pytest.fixture(autouse=True)
+def less_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Most of these tests end with questions that nobody answers."""
+    monkeypatch.setattr(master, "_ANSWER_S", 0.6)
 
 
 class Life(threading.Thread):
