@@ -27,9 +27,11 @@ import hydraulic_sysid.nodes.recorder
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_can_driver.nodes import can_driver
 from hydraulic_can_driver.virtual import Reading, VirtualBench
+from hydraulic_interfaces.pacing import request_realtime
 
 # What the virtual hydraulics do; the identification has to find it.
 GAIN, LAG, START = 0.02, 0.2, 0.1  # (m/s)/V, s, m
+LISTENERS = Path("/proc/net/can/rcvlist_all")  # who receives every frame of an interface: candump, once it is up
 READY_S, RUN_S, END_S = 200.0, 500.0, 60.0
 
 
@@ -116,6 +118,7 @@ def devices(folder: Path, channel: str) -> int:
     leave = threading.Event()
     signal.signal(signal.SIGINT, lambda *_: leave.set())
     bench = VirtualBench(replace(load_bus(folder / "bus.yaml"), channel=channel), None, FirstOrderCylinder())
+    request_realtime(30)  # devices do not wait for each other's programs; the bench's threads inherit it
     with bench:
         print("ready", flush=True)
         leave.wait()
@@ -157,6 +160,7 @@ def main() -> int:
         # -L: log format, with the kernel's time of reception to the microsecond.
         witness = subprocess.Popen(["candump", "-L", channel], stdout=sink)
         children = Children(folder)
+        children.until(lambda: channel in LISTENERS.read_text(), READY_S)
         try:
             run(channel, folder, children)
         finally:
