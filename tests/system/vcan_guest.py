@@ -153,6 +153,12 @@ def run(channel: str, folder: Path, children: Children) -> None:
     children.interrupt("devices")
 
 
+def listened_to(channel: str) -> bool:
+    """Whether somebody receives every frame of the interface."""
+    lines = LISTENERS.read_text().splitlines()
+    return any(line.split()[:1] == [channel] for line in lines)
+
+
 def main() -> int:
     channel, folder = sys.argv[1], Path(sys.argv[2])
     begun = time.monotonic()
@@ -160,7 +166,7 @@ def main() -> int:
         # -L: log format, with the kernel's time of reception to the microsecond.
         witness = subprocess.Popen(["candump", "-L", channel], stdout=sink)
         children = Children(folder)
-        children.until(lambda: channel in LISTENERS.read_text(), READY_S)
+        children.until(lambda: listened_to(channel), READY_S)
         try:
             run(channel, folder, children)
         finally:
