@@ -96,7 +96,7 @@ CUTS += [("lvdt", step) for step in ("other devices", "operational", "first SYNC
 @pytest.mark.parametrize(("node", "step"), CUTS)
 def test_power_of_a_device(node: str, step: str, rig: Callable[..., Any], wait_until: Any) -> None:
     kind, name, detail, count = STEPS[step]
-    here = rig(missed_cycles=20, state_change=0.5)
+    here = rig(missed_cycles=20, state_change=1.0)
     cut, event = upset.PowerCut(node), threading.Event()
     here.devices.at(kind, name, detail, cut, count)
     here.devices.listeners.append(
@@ -121,7 +121,7 @@ def test_power_of_the_driver(
 ) -> None:
     """From the step on not one more frame of the driver reaches the bus: as if its plug had been pulled."""
     kind, name, detail, count = STEPS[step]
-    here = rig(lost_after=0.3, state_change=0.5)
+    here = rig(lost_after=0.3, state_change=1.0)
     event = threading.Event()
     seen = [0]
 
