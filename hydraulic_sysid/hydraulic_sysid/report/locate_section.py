@@ -22,6 +22,9 @@ SUBSYSTEMS = {
 }
 
 
+_WORTH = 0.01  # share from which a subsystem has a card
+
+
 def html(result: Result, place: Figures) -> str:
     """The location's part of the page; its figures are given their places in ``place``."""
     if not result["balances"]:
@@ -70,6 +73,7 @@ def _cards(result: Result) -> str:
             f"{percent(s['alone'])} if nothing else is blamed",
         )
         for s in blamed
+        if s["share"] >= _WORTH
     ]
     return tag(
         "div",
