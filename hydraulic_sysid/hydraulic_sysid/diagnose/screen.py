@@ -23,7 +23,7 @@ from .candidates import Hints, Probe, between, inverse, observed, probes
 
 Array = NDArray[np.float64]
 
-ENOUGH = 60  # fitted pieces from which every second one does for a look
+ENOUGH = 50  # pieces that do for a look, spread over all records
 
 
 @dataclass(frozen=True)
@@ -36,16 +36,16 @@ class Prospect:
 
 
 def screen(anchor: Anchor, effects: Sequence[Effect], hints: Hints) -> list[Prospect]:
-    """All candidates, the most promising first; gains of the fitted pieces, half of which are looked at if many."""
+    """All candidates, the most promising first; gains of all fitted pieces, some of which are looked at."""
     part, share = sample(anchor)
     found = [_prospect(part, effect, hints, share) for effect in effects]
     return sorted((f for f in found if f is not None), key=lambda f: -f.gain)
 
 
 def sample(anchor: Anchor) -> tuple[Anchor, float]:
-    """The anchor on fitted pieces alone, on every second one if there are many; and how much of them that is."""
+    """The anchor on fitted pieces alone, on every so many of them; and what share of them that is."""
     total = sum(int(f.sum()) for f in anchor.split.fitted)
-    every = 2 if total >= ENOUGH else 1
+    every = max(1, round(total / ENOUGH))
     chosen = []
     for fitted in anchor.split.fitted:
         keep = np.zeros_like(fitted)

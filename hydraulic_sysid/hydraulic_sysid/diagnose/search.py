@@ -21,12 +21,16 @@ from .levels import Level, level, material, repaired
 from .pieces import Split
 from .screen import Prospect, screen
 
-PROMISING = 0.02  # of the best predicted gain, from which a candidate is refitted
-MOST_REFITS = 10
+PROMISING = 0.04  # of the best predicted gain, from which a candidate is refitted
+MOST_REFITS = 8
+LATER_REFITS = 4  # once something was added
 FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
-NEAR = 0.7  # of the best gain, from which a refit is finished
+NEAR = 0.93  # of the best gain, from which a refit is finished
 MOST_EFFECTS = 3
+FURTHER = 0.25  # of what is left, which a further effect must repair, unless it repairs a good part of all
 NEEDED = 0.02  # of all that was repaired, which an effect must repair beside the others to stay
+DISTANT = 0.1  # of what an effect repairs, by which a quick refit in its place may lie above, to be finished
+SETTLED = 0.006  # mean square beyond the noise below which nothing more is looked for
 MOST_SWAPS = 3
 HOPELESS = 0.6  # of what noise does not explain: where less is repaired, exchanging effects will not do either
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended
@@ -116,30 +120,39 @@ class Search:
         self.say("fitting the model as it is")
         base = stage = self.explore(self.stage(model))
         added: list[str] = []
-        rivals: dict[str, Stage] = {}
+        path = [stage]
         while len(added) < MOST_EFFECTS:
-            better = self.finish(stage)
-            if better is None or not self._worth(base.level, stage.level, better.level, bool(added)):
+            better = self.finish(path[-1])
+            if better is None or not self._worth(base.level, path[-1].level, better.level, bool(added)):
                 break
-            name = next(e for e in better.model.effects if e not in stage.model.effects)
-            rivals = {name: stage}
-            added.append(name)
-            stage = self.explore(better, most=MOST_REFITS // 2)
-        if len(added) > 1:
-            stage, added, rivals = self._review(base, stage, added)
-        return Found(base, stage, added, self._steps(base, stage, added), rivals)
+            added.append(_new(better, path[-1]))
+            nothing = better.level.variance - 1.0 < SETTLED
+            path.append(better if nothing else self.explore(better, most=LATER_REFITS))
+            if nothing:
+                break
+        rivals = {added[-1]: path[-2]} if added else {}
+        if len(added) <= 1:
+            return Found(base, path[-1], added, [(name, path[-1].level) for name in added], rivals)
+        final, kept, rivals = self._review(base, path[-1], added, rivals)
+        if kept == added:
+            return Found(base, final, added, [(n, p.level) for n, p in zip(added, path[1:], strict=True)], rivals)
+        return Found(base, final, kept, self._steps(base, final, kept), rivals)
 
     def _worth(self, base: Level, before: Level, after: Level, further: bool) -> bool:
         """Whether a further effect repairs a good part of what is left, or of what there was."""
         if not further:
             return True
-        return repaired(before, after) >= 0.5 or repaired(base, after) - repaired(base, before) >= NEEDED
+        return repaired(before, after) >= FURTHER or repaired(base, after) - repaired(base, before) >= NEEDED
 
-    def _review(self, base: Stage, stage: Stage, added: list[str]) -> tuple[Stage, list[str], dict[str, Stage]]:
-        """Leave out what the others make superfluous; put in an effect's place what fits better there."""
-        rivals: dict[str, Stage] = {}
-        swaps = 0
-        queue = list(added[:-1]) + added[-1:]
+    def _review(
+        self, base: Stage, stage: Stage, added: list[str], rivals: dict[str, Stage]
+    ) -> tuple[Stage, list[str], dict[str, Stage]]:
+        """Leave out what the others make superfluous; put in an effect's place what fits better there.
+
+        ``rivals``: of the effect that came last, known already.
+        """
+        added, rivals, swaps = list(added), dict(rivals), 0
+        queue = added[:-1]
         while queue and len(added) > 0:
             name = queue.pop(0)
             if name not in added:
@@ -149,15 +162,21 @@ class Search:
                 break
             without = self.stage(stage.model.without_effect(name), replace(self.settings, most_steps=LAST_STEPS))
             lost = without.level.total - stage.level.total
-            if not material(without.level, stage.level) or lost < NEEDED * (base.level.total - stage.level.total):
+            part = repaired(without.level, stage.level)
+            if not material(without.level, stage.level) or (
+                part < FURTHER and lost < NEEDED * (base.level.total - stage.level.total)
+            ):
                 self.say(f"leaving out {name}")
                 added.remove(name)
                 stage, rivals, queue = without, {}, list(added)
                 continue
-            without = self.explore(without, most=MOST_REFITS // 2)
+            without = self.explore(without, most=LATER_REFITS)
             rivals[name] = without
-            if repaired(base.level, stage.level) < HOPELESS:
+            left = stage.level.excess + DISTANT * (without.level.total - stage.level.total)
+            close = [t for t in without.trials if t.name != name and t.level.excess < left]
+            if not close or repaired(base.level, stage.level) < HOPELESS:
                 continue
+            without = replace(without, trials=close)
             other = self.finish(without)
             if (
                 other is not None
@@ -165,7 +184,7 @@ class Search:
                 and swaps < MOST_SWAPS
                 and (stage.level.total - other.level.total > stage.level.least)
             ):
-                new = next(e for e in other.model.effects if e not in without.model.effects)
+                new = _new(other, without)
                 self.say(f"{new} in the place of {name}")
                 added[added.index(name)] = new
                 stage, swaps = other, swaps + 1
@@ -192,3 +211,8 @@ class Search:
             steps.append((name, self.stage(model).level))
         added[:] = order
         return steps
+
+
+def _new(stage: Stage, before: Stage) -> str:
+    """The effect that a stage has beyond another."""
+    return next(e for e in stage.model.effects if e not in before.model.effects)
