@@ -144,7 +144,7 @@ def test_lifecycle_live_gains_and_stale_states(plant: Any, node: Any, client: An
 
 @pytest.mark.parametrize(
     "effects",
-    ["{valve_deadband: {width: 0.02}}", "{supply_droop: {resistance: 2.0e9, time: 0.1}}"],
+    ["{valve_deadband: {width: 0.02}}", "{supply_droop: {resistance: 4.0e9, time: 0.1}}"],
     ids=["deadband", "droop"],
 )
 def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(
@@ -173,10 +173,10 @@ def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(
     response, switch = Response.from_document(document), 1e-9 * (switched_ns - document["start_ns"])
     error = np.abs(response.reference - response.position)
     assert 1.5 < switch < 3.5, "in the middle of the sine"
-    before = error[(response.time > 0.5) & (response.time < switch - 0.6)].max()
-    after = error[(response.time > switch) & (response.time < 4.5)].max()
-    assert before < after, "it shows in the error"
-    assert after < 0.02, "and does not run away"
+    before = error[(response.time > 0.5) & (response.time < switch - 0.6)]
+    after = error[(response.time > switch) & (response.time < 4.5)]
+    assert np.sqrt(np.mean(before**2)) < np.sqrt(np.mean(after**2)), "it shows in the error"
+    assert after.max() < 0.02, "and does not run away"
     assert np.all(np.isfinite(response.drive)) and np.abs(response.drive).max() <= 10.0
     assert error[-1] < 2e-3, "it comes to rest"
     assert math.isfinite(float(controller_says(heard)["error_m"]))
