@@ -7,7 +7,7 @@ import pytest
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.diagnose import DiagnosisError, add, diagnose
+from hydraulic_sysid.diagnose import DiagnosisError, add, diagnose, verdict
 from hydraulic_sysid.diagnose.anchor import SCATTER, bounded
 from hydraulic_sysid.diagnose.candidates import Hints, between, candidates, inverse, probes
 from hydraulic_sysid.diagnose.levels import Level, material, repaired
@@ -120,6 +120,16 @@ def test_shapes_are_effects_of_their_own_and_none_of_the_library(model) -> None:
     assert FILES
     for file in FILES:
         assert file.stem not in model.library
+
+
+def test_what_the_amplifier_imitates_is_said_before_the_hydraulics_are_blamed() -> None:
+    plain = standing(2.0)
+    told = Record.sampled(
+        "told", DT, dict(plain.channels), description={"plant": {"imitated_effects": ["valve_deadband"]}}
+    )
+    assert verdict.imitated([plain]) == [] and verdict.imitated([plain, told]) == ["valve_deadband"]
+    assert "read those settings first" in verdict.warning(["valve_deadband"], ["valve_deadband"])
+    assert verdict.warning(["valve_deadband"], []) == ""
 
 
 def test_unusable_input_is_named(model) -> None:

@@ -35,6 +35,7 @@ def document(
     """The document; arrays NumPy, SI."""
     base, final = found.base, found.final
     named = _named(found, rivals, kind)
+    imitations = verdict.imitated([*records, *held_out])
     effects = _effects(found, rivals, known)
     levels = {"explained": final.level.variance <= 1.0 + 2.0 * verdict.UNSEEN, "off": kind == verdict.OUTSIDE}
     return {
@@ -58,7 +59,8 @@ def document(
             "level": "explained" if levels["explained"] else "off" if levels["off"] else "close",
             "effects": named,
             "subsystem": _subsystem(found, kind, shapes, after or before),
-            "text": verdict.sentences(found, rivals, kind, shapes),
+            "text": verdict.sentences(found, rivals, kind, shapes) + verdict.warning(named, imitations),
+            "imitated": imitations,
         },
         "error": {"unit": "residual over noise", "before": _level(base.level), "after": _level(final.level)},
         "steps": [{"name": name, **_level(at)} for name, at in found.steps],

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from hydraulic_sysid.records import Record
+
 from .rivals import Rival
 from .search import Found
 from .shape import Shape
@@ -81,6 +83,28 @@ def sentences(found: Found, rivals: Mapping[str, Sequence[Rival]], kind: str, sh
             f"{100 * best.share:.0f} % of what is left."
         )
     return text.strip()
+
+
+def imitated(records: Sequence[Record]) -> list[str]:
+    """Effects that the amplifier or valve itself imitates, as it said when the records were made."""
+    found: set[str] = set()
+    for record in records:
+        plant = record.description.get("plant")
+        if isinstance(plant, Mapping):
+            found |= {str(name) for name in plant.get("imitated_effects", ())}
+    return sorted(found)
+
+
+def warning(named: Sequence[str], imitations: Sequence[str]) -> str:
+    """What to look at before the hydraulics are blamed; empty where nothing is imitated."""
+    both = [name for name in named if name in imitations]
+    if both:
+        return (
+            f" The devices on the bus are set so that they imitate {_and(both)}: read those settings first (inspect)."
+        )
+    if imitations:
+        return f" The devices on the bus are set so that they imitate {_and(list(imitations))}."
+    return ""
 
 
 def _why_not(found: Found, rivals: Mapping[str, Sequence[Rival]]) -> str:
