@@ -1,10 +1,10 @@
 """Parameter files of the controller: what `tune` writes and the node reads, in the form of ROS parameter files.
 
-    # where the gains come from, as comments
-    /actuator/controller:
-      ros__parameters:
-        controller: npid
-        kp: 150.0
+# where the gains come from, as comments
+/actuator/controller:
+  ros__parameters:
+    controller: npid
+    kp: 150.0
 """
 
 from __future__ import annotations

@@ -156,4 +156,3 @@ class ControlSession:
     def _fault(self, fault: Fault, detail: str) -> None:
         self.faults[fault] += 1
         self.trouble = f"{fault.value}: {detail}" if detail else fault.value
-

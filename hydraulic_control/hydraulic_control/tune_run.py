@@ -137,8 +137,4 @@ def starts(
     common["velocity_feedforward"] = 1.0 / simple[0]
     if law == "pid":
         return [common | g.as_values() for g in gains.values()]
-    return [
-        common | _shaped(g.as_values(), shape)
-        for g in gains.values()
-        for shape in SHAPES
-    ]
+    return [common | _shaped(g.as_values(), shape) for g in gains.values() for shape in SHAPES]

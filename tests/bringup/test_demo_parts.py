@@ -185,7 +185,6 @@ def test_over_can_the_demo_brings_its_own_devices_and_touches_no_real_bus() -> N
     assert told["--bus"] == values["bus"]
 
 
-
 def bag_without(folder: Path, lost: list[int], samples: int = 2000) -> Path:
     """A bag at 1 kHz in which some samples are missing."""
     time = 1e-3 * np.arange(samples)

@@ -221,9 +221,7 @@ def test_what_is_not_ours_is_moved_not_deleted(
     assert (tmp_path / ".venv.moved-2/precious").read_text() == "2"
 
 
-def test_callers_python_path_does_not_pass_as_installed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_callers_python_path_does_not_pass_as_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[dict[str, str]] = []
     monkeypatch.setattr(virtualenv, "run_step", lambda *_, environ, **__: seen.append(dict(environ)))
     checkout = make_checkout(tmp_path)

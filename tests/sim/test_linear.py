@@ -42,9 +42,10 @@ def test_it_predicts_a_small_motion_of_the_nonlinear_plant():
     assert point.velocity == pytest.approx(2.0 * closed_form(model).velocity_gain, rel=0.01)
     start = plant.initial_state(0.0, point.velocity, point.pressure_a, point.pressure_b, 2.0)
     step = 0.02
-    moved = plant.simulate(np.full(200, 2.0 + step), 1e-3, start).velocity - plant.simulate(
-        np.full(200, 2.0), 1e-3, start
-    ).velocity
+    moved = (
+        plant.simulate(np.full(200, 2.0 + step), 1e-3, start).velocity
+        - plant.simulate(np.full(200, 2.0), 1e-3, start).velocity
+    )
     system = linearise(model, drive=2.0)
     from scipy.linalg import expm
 

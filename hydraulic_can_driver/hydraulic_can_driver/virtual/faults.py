@@ -291,7 +291,7 @@ def _valve(bench: VirtualBench, name: str) -> Valve:
 def _lvdt(bench: VirtualBench, name: str) -> Lvdt:
     device = bench.devices[name]
     if not isinstance(device, Lvdt):
-        raise ValueError(f"{name} is no LVDT; profiles are {({d.name: d.spec.profile for d in _all(bench)})}")
+        raise ValueError(f"{name} is no LVDT; profiles are { ({d.name: d.spec.profile for d in _all(bench)}) }")
     return device
 
 

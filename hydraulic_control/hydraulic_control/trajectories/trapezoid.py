@@ -25,9 +25,7 @@ class Trapezoid:
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Trapezoid:
         """See `make`."""
-        return cls(
-            settings["offset"], settings["amplitude"], limits.velocity, limits.acceleration, settings["dwell"]
-        )
+        return cls(settings["offset"], settings["amplitude"], limits.velocity, limits.acceleration, settings["dwell"])
 
     @property
     def _way(self) -> tuple[float, float]:

@@ -57,7 +57,6 @@ EFFECT = Effect(
             (1.0, 1.4),
             "polytropic exponent n",
             "isothermal 1 to adiabatic 1.4",
-            free=False,
         ),
     ),
     equation="1/be = [(1-a)*e/b + a*(p0/p)^(1/n)/(n*p)] / [(1-a)*e + a*(p0/p)^(1/n)], e = exp(-(p-p0)/b)",

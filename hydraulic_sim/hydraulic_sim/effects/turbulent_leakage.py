@@ -8,7 +8,6 @@ Source: Merritt (1967), Hydraulic Control Systems, ch. 3 (orifice flow).
 from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.kernels import smooth_root_gain
 
-
 TRANSITION = 1e4  # Pa, drop below which the leak turns laminar
 
 
@@ -38,9 +37,6 @@ EFFECT = Effect(
     confused_with=("internal_leakage",),
     told_apart_by="several loads: drift grows with the root of the load pressure",
     step_rate=lambda p: (
-        2.0
-        * p["coefficient"]
-        * p["bulk_modulus"]
-        / (TRANSITION**0.5 * min(p["dead_volume_a"], p["dead_volume_b"]))
+        2.0 * p["coefficient"] * p["bulk_modulus"] / (TRANSITION**0.5 * min(p["dead_volume_a"], p["dead_volume_b"]))
     ),
 )

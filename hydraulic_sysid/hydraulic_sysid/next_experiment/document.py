@@ -153,8 +153,10 @@ def _verdict(design: Design) -> dict[str, str]:
     worst = min(design.refits, key=lambda r: r.left)
     t, r = (design.name(i) for i in worst.pair)
     seconds = design.plan.active_time
-    last = f"the closest two are {t} (true) and {r} (refitted)" if len(design.rivals) > 2 else (
-        f"the harder way round is {r} refitted to {t}"
+    last = (
+        f"the closest two are {t} (true) and {r} (refitted)"
+        if len(design.rivals) > 2
+        else (f"the harder way round is {r} refitted to {t}")
     )
     level = "explained" if worst.separation >= CLEAR else "close" if worst.separation >= _FAINT else "off"
     apart = f"{number(worst.separation)} standard deviations of the noise apart after every refit ({last})"

@@ -49,7 +49,8 @@ def steps(result: Result) -> go.Figure:
         )
         panels.annotations.append(
             {"x": names[i + 1], "y": np.log10(high) if _tall(levels) else high, "xref": "x", "yref": "y",
-             "text": f"−{100.0 * (1.0 - low / high):.0f} %" if low < high else "", "showarrow": False,
+             "text": f"−{100.0 * (1.0 - low / high):.0f} %" if high - low > 0.08 * max(levels) else "",
+             "showarrow": False,
              "yanchor": "bottom", "font": {"size": 12}}
         )  # fmt: skip
     _at_one(panels, 0)

@@ -129,7 +129,8 @@ def _thesis(result: Result, place: Figures) -> str:
     lead = (
         "The paper says: choose the excitation from the bandwidth, 0.1 … 2 times. The same two excitations, a decade "
         "below and above, as large as the limits allow, tried on the held-out data of the paper's band and on the "
-        "grid. The ARX model keeps its 50 ms, so that the upper half of the band above lies beyond its Nyquist frequency."
+        "grid. The ARX model keeps its 50 ms, so that the upper half of the band above lies beyond its Nyquist "
+        "frequency."
     )
     content = tag("ul", said, "findings") + place.place(figures.thesis(result)) + table(head, rows)
     return section("The thesis, tried", lead, content)
