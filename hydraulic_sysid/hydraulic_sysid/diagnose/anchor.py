@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -79,6 +79,10 @@ class Anchor:
             [self.columns[i][chosen[i]] for i in used],
             [self.beyond[i][chosen[i]] for i in used],
         )
+
+    def slim(self) -> Anchor:
+        """The same without ``columns``, which only refits need: a search keeps several anchors in memory."""
+        return replace(self, columns=[])
 
     @property
     def bounds(self) -> list[tuple[float, float]]:

@@ -15,9 +15,9 @@ from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.errors import ModelError
 from hydraulic_sim.model import Model
 
-SHAPES = (1.0, 0.3, 3.0)  # of the default
+SHAPES = (1.0, 0.3, 3.0, 8.0)  # of the default
 SIZES = (1.0, 0.25)  # of the default, measured from the null value
-MOST_SHAPES = 5
+MOST_SHAPES = 7
 ANGLE = "rad"
 
 

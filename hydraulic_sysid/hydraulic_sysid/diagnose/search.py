@@ -97,7 +97,7 @@ class Search:
             done = refit(point, point.model.with_effect(prospect.effect.name), prospect.start)
             trials.append(Trial(prospect.effect.name, prospect.gain, done, level(self.split, done)))
         trials.sort(key=lambda t: t.level.total)
-        return replace(base, trials=trials, prospects=found)
+        return replace(base, anchor=point.slim(), trials=trials, prospects=found)
 
     def finish(self, base: Stage) -> Stage | None:
         """The best of the trials, fitted to the end; None where none is worth it."""
