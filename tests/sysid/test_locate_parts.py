@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from hydraulic_sysid.locate.blame import FOLDS, PARAMETERS, Moments, rank
+from hydraulic_sysid.locate.blame import PARAMETERS, rank
 from hydraulic_sysid.locate.curves import play, rate_limited, signed_knots, tents
 from hydraulic_sysid.locate.lines import common_lines, waves
+from hydraulic_sysid.locate.moments import FOLDS, Moments
 from hydraulic_sysid.locate.noise_model import ORDER, Whitener, thin
 from hydraulic_sysid.verbs.locate import main
 
@@ -92,9 +93,10 @@ def test_what_is_left_on_other_folds_is_the_noise_and_bounds_bind() -> None:
     truth = np.array([0.6, 0.0, 2.0])
     moments, x, y = _moments(5, truth, 8000)
     assert moments.count.sum() == 8000 and len(moments.count) == FOLDS
-    wide = moments.left(np.array([1, 2]), 1, np.array([-9.0]), np.array([9.0]))
+    none = np.zeros(0, dtype=np.int64)
+    wide = moments.left(none, np.array([1, 2]), np.array([-9.0]), np.array([9.0]))
     assert wide / 8000 == pytest.approx(1.0, abs=0.05)
-    bound = moments.left(np.array([1, 2]), 1, np.array([-0.1]), np.array([0.1]))
+    bound = moments.left(np.array([1]), np.array([2]), np.array([-0.1]), np.array([0.1]))
     solution = lsq_linear(x.T, y, bounds=([-0.1, -np.inf, -np.inf], [0.1, np.inf, np.inf])).x
     assert solution[0] == pytest.approx(0.1)
     assert bound == pytest.approx(float(np.sum((y - solution @ x) ** 2)), rel=0.01)

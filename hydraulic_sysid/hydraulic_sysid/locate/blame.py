@@ -13,106 +13,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import lsq_linear
 
-Array = NDArray[np.float64]
+from .moments import Array, Index, Moments
 
 PARAMETERS = "parameters"
 Bounds = tuple[float, float]
-FOLDS = 4
-BLOCK_SECONDS = 0.5
-_RIDGES = (1e-6, 1e-4, 1e-2, 1e-1, 1.0)
-_SEEN = 0.1  # part of a direction's power outside the fold left out, from which it is fitted
 _LEAST = 10.0  # gain over ln N from which a subsystem gets a share
 _SMALL = 0.1  # and least part of what those before have left
-_TOLD = 0.05  # share from which it is said over what it goes
 _MOST = 3  # subsystems that get a share
-
-
-@dataclass(frozen=True)
-class Moments:
-    """Sums of products of the directions (K) and the balances, per fold.
-
-    ``gram`` (FOLDS, K, K), ``cross`` (FOLDS, K), ``square`` (FOLDS,), ``count`` (FOLDS,) samples of all balances.
-    """
-
-    gram: Array
-    cross: Array
-    square: Array
-    count: Array
-
-    @classmethod
-    def of(cls, directions: Array, balances: Array, rate: float) -> Moments:
-        """From whitened directions ``(K, B, m)`` and balances ``(B, m)`` at ``rate`` samples per second."""
-        size, _, length = directions.shape
-        fold = (np.arange(length) // max(1, int(round(BLOCK_SECONDS * rate)))) % FOLDS
-        gram, cross = np.empty((FOLDS, size, size)), np.empty((FOLDS, size))
-        square, count = np.empty(FOLDS), np.empty(FOLDS)
-        for k in range(FOLDS):
-            part = np.ascontiguousarray(directions[:, :, fold == k]).reshape(size, -1)
-            own = balances[:, fold == k].reshape(-1)
-            gram[k], cross[k], square[k], count[k] = part @ part.T, part @ own, own @ own, own.size
-        return cls(gram, cross, square, count)
-
-    def __add__(self, other: Moments) -> Moments:
-        return Moments(
-            self.gram + other.gram, self.cross + other.cross, self.square + other.square, self.count + other.count
-        )
-
-    def left(self, chosen: NDArray[np.int64], bounded: int, low: Array, high: Array) -> float:
-        """Sum of squares that directions ``chosen`` leave on the folds that they were not fitted to.
-
-        The coefficients of the first ``bounded`` directions of all stay within ``low`` … ``high``; ``chosen`` are
-        others. These are eliminated first (Schur complement), which leaves a small box-constrained problem.
-        """
-        own = np.concatenate((np.arange(bounded), chosen))
-        if own.size == 0:
-            return float(self.square.sum())
-        grams, crosses = self.gram[:, own][:, :, own], self.cross[:, own]
-        whole, all_cross = grams.sum(axis=0), crosses.sum(axis=0)
-        totals = np.full(len(_RIDGES), float(self.square.sum()))
-        for k in range(FOLDS):
-            train = whole - grams[k]
-            # A direction that hardly any but the fold left out has seen cannot be judged: it gets no weight.
-            seen = np.diag(train) > _SEEN * np.diag(whole)
-            scale = np.sqrt(np.where(seen, np.diag(whole), np.inf))
-            train /= np.outer(scale, scale)
-            target = (all_cross - crosses[k]) / scale
-            limits = _times(low, scale[:bounded]), _times(high, scale[:bounded])
-            for i, ridge in enumerate(_RIDGES):
-                fitted = _bounded_fit(train + ridge * np.eye(len(train)), target, bounded, *limits) / scale
-                totals[i] += fitted @ (grams[k] @ fitted) - 2.0 * fitted @ crosses[k]
-        return float(totals.min())
-
-
-def _times(bound: Array, scale: Array) -> Array:
-    """Bounds in units of the scaled directions; one without any power may do what it likes."""
-    return np.where(np.isfinite(scale), bound * np.where(np.isfinite(scale), scale, 1.0), np.sign(bound))
-
-
-def _bounded_fit(gram: Array, cross: Array, bounded: int, low: Array, high: Array) -> Array:
-    """Minimum of ½·cᵀ·G·c − cᵀ·b with the first ``bounded`` of c within ``low`` … ``high``."""
-    if bounded == 0:
-        return cho_solve(cho_factor(gram), cross)
-    if bounded == len(gram):
-        return _boxed(gram, cross, low, high)
-    rest = cho_factor(gram[bounded:, bounded:])
-    link = gram[bounded:, :bounded]
-    back, alone = cho_solve(rest, link), cho_solve(rest, cross[bounded:])
-    reduced = gram[:bounded, :bounded] - link.T @ back
-    first = _boxed(reduced, cross[:bounded] - link.T @ alone, low, high)
-    return np.concatenate((first, alone - back @ first))
-
-
-def _boxed(gram: Array, cross: Array, low: Array, high: Array) -> Array:
-    """The same with every coefficient bounded; bounds that do not bind cost nothing."""
-    free: Array = np.linalg.solve(gram, cross).astype(np.float64)
-    if np.all((free >= low) & (free <= high)):
-        return free
-    root = np.linalg.cholesky(0.5 * (gram + gram.T))
-    return lsq_linear(root.T, np.linalg.solve(root, cross), bounds=(low, high), method="bvls").x
+_WORTH = 2.0  # gain over ln N from which directions over one more variable are taken in
+_PART = 1e-3  # and least part of what those before have gained
 
 
 @dataclass(frozen=True)
@@ -125,7 +35,7 @@ class Blame:
     gain: float
     """Fall of the sum of squares on data left out, in units of the noise's variance, beyond the twin's."""
     variables: dict[str, float]
-    """Variable → part of this subsystem's gain (alone) that its directions over this variable reach by themselves."""
+    """Variable → part of this subsystem's gain that its directions over this variable reach by themselves."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +51,55 @@ class Verdict:
     count: float
 
 
+@dataclass(frozen=True)
+class _Trial:
+    """What a family of directions reaches: those of it that are worth it, what they leave, and what they gain."""
+
+    chosen: Index
+    left: float
+    left_twin: float
+    gain: float
+    by: dict[str, float]
+
+
+class _Court:
+    """Tries families on the record and on its twin."""
+
+    def __init__(self, measured: Moments, twin: Moments, names: Sequence[str], over: Sequence[str], box: Array) -> None:
+        self.measured, self.twin = measured, twin
+        self.over = np.array(over)
+        owner = np.array(names)
+        self.families = {n: np.flatnonzero(owner == n) for n in dict.fromkeys(names) if n != PARAMETERS}
+        self.low, self.high = box.reshape(-1, 2).T
+        self.count = float(measured.count.sum())
+
+    def left(self, taken: Index, tried: Index) -> float:
+        return self.measured.left(taken, tried, self.low, self.high)
+
+    def left_twin(self, taken: Index, tried: Index) -> float:
+        return self.twin.left(taken, tried, self.low, self.high)
+
+    def trial(self, family: str, taken: Index, before: float, before_twin: float) -> _Trial:
+        """Take in the family's variables one after the other, the best first, as long as each is worth it."""
+        own = self.families[family]
+        groups = {name: own[self.over[own] == name] for name in dict.fromkeys(self.over[own].tolist())}
+        chosen: Index = np.zeros(0, dtype=np.int64)
+        now = before
+        by: dict[str, float] = {}
+        while groups:
+            left = {name: self.left(taken, np.concatenate((chosen, g))) for name, g in groups.items()}
+            by = by or {name: before - value for name, value in left.items()}
+            best = min(left, key=lambda name: left[name])
+            if now - left[best] <= max(_WORTH * np.log(self.count), _PART * (before - now)):
+                break
+            chosen, now = np.concatenate((chosen, groups.pop(best))), left[best]
+        now_twin = self.left_twin(taken, chosen)
+        gain = before - now - max(before_twin - now_twin, 0.0)
+        whole = max(before - now, 1e-300)
+        parts = {n: max(0.0, v / whole) for n, v in sorted(by.items(), key=lambda item: -item[1])}
+        return _Trial(chosen, now, now_twin, gain, parts)
+
+
 def rank(
     measured: Moments, twin: Moments, subsystems: Sequence[str], variables: Sequence[str], bounds: Sequence[Bounds]
 ) -> Verdict:
@@ -149,42 +108,25 @@ def rank(
     ``bounds``: how far each parameter (they come first) may still move. The twin is an exact model's record under the
     same noise: what a subsystem explains of it, for directions are made from noisy signals too, is taken off.
     """
-    owner, over = np.array(subsystems), np.array(variables)
-    index = {n: np.flatnonzero(owner == n) for n in dict.fromkeys(subsystems) if n != PARAMETERS}
-    base: NDArray[np.int64] = np.flatnonzero(owner == "")  # none: the parameters always take part
-    box = (len(bounds), *np.array(bounds, dtype=float).reshape(-1, 2).T)
-    count = float(measured.count.sum())
-    refitted, exact = measured.left(base, *box), twin.left(base, *box)
+    court = _Court(measured, twin, subsystems, variables, np.array(bounds, dtype=float))
+    none: Index = np.zeros(0, dtype=np.int64)
+    taken, count = none, court.count
+    now, now_twin = refitted, exact = court.left(none, none), court.left_twin(none, none)
     excess = max(refitted - exact, 1e-9 * count)
-
-    def gain(chosen: NDArray[np.int64], before: float, before_twin: float) -> tuple[float, float, float]:
-        after, after_twin = measured.left(chosen, *box), twin.left(chosen, *box)
-        return before - after - max(before_twin - after_twin, 0.0), after, after_twin
-
-    alone = {n: gain(np.concatenate((base, i)), refitted, exact) for n, i in index.items()}
-    ranked: list[Blame] = []
-    taken, now, now_twin, tried = base, refitted, exact, alone
-    rest = list(index)
-    while rest:
-        best = max(tried, key=lambda n: tried[n][0])
-        won, after, after_twin = tried[best]
-        if won <= max(_LEAST * np.log(count), _SMALL * (now - now_twin)):
+    alone = {n: court.trial(n, none, refitted, exact) for n in court.families}
+    tried, ranked, rest = alone, list[Blame](), list(court.families)
+    while rest and len(ranked) < _MOST:
+        best = max(rest, key=lambda n: tried[n].gain)
+        trial = tried[best]
+        if trial.gain <= max(_LEAST * np.log(count), _SMALL * (now - now_twin)):
             break
-        by: dict[str, float] = {}
-        for name in dict.fromkeys(over[index[best]].tolist()) if won > _TOLD * excess or not ranked else ():
-            mine = np.flatnonzero((owner == best) & (over == name))
-            by[name] = max(0.0, gain(np.concatenate((taken, mine)), now, now_twin)[0]) / won
-        by = dict(sorted(by.items(), key=lambda item: -item[1]))
-        share = min(won / excess, 1.0 - sum(b.share for b in ranked))
-        ranked.append(Blame(best, share, alone[best][0] / excess, won, by))
+        share = min(trial.gain / excess, 1.0 - sum(b.share for b in ranked))
+        ranked.append(Blame(best, share, alone[best].gain / excess, trial.gain, trial.by))
         rest.remove(best)
-        taken = np.concatenate((taken, index[best]))
-        now, now_twin = after, after_twin
-        tried = {n: gain(np.concatenate((taken, index[n])), now, now_twin) for n in rest} if len(ranked) < _MOST else {}
-        if not tried:
-            break
-    for n in sorted(rest, key=lambda n: -alone[n][0]):
-        ranked.append(Blame(n, 0.0, alone[n][0] / excess, 0.0, {}))
+        taken, now, now_twin = np.concatenate((taken, trial.chosen)), trial.left, trial.left_twin
+        tried = {n: court.trial(n, taken, now, now_twin) for n in rest} if len(ranked) < _MOST else {}
+    for n in sorted(rest, key=lambda n: -alone[n].gain):
+        ranked.append(Blame(n, 0.0, alone[n].gain / excess, 0.0, {}))
     left = now + (exact - now_twin)
     before = float(measured.square.sum())
     return Verdict(before / count, refitted / count, left / count, exact / count, ranked, count)

@@ -18,9 +18,10 @@ from hydraulic_sysid.results import heading
 
 from . import figures, words
 from .balances import NEEDS, Balances, LocateError, formable
-from .blame import PARAMETERS, Moments, Verdict, rank
+from .blame import PARAMETERS, Verdict, rank
 from .knots import Knots
 from .lines import common_lines
+from .moments import Moments
 from .noise_model import ORDER, RATE
 from .study import Study, moments, size_of, study
 

@@ -39,7 +39,7 @@ class Knots:
             velocity=signed_knots(every("velocity"), 12),
             position=even_knots(position, 24),
             leak_position=even_knots(position, 12),
-            drive=signed_knots(every("drive"), 16),
+            drive=np.union1d(signed_knots(every("drive"), 16), even_knots(every("drive"), 48)),
             load=signed_knots(load, 3),
             leak_load=signed_knots(load, 6),
             pressure=even_knots(np.concatenate((every("pressure_a"), every("pressure_b"))), 6),

@@ -13,10 +13,11 @@ from hydraulic_sysid.compare.prediction import start
 from hydraulic_sysid.records import Record
 
 from .balances import Balances, Residuals
-from .blame import PARAMETERS, Moments
+from .blame import PARAMETERS
 from .directions import families, turning
 from .knots import Knots
 from .lines import waves
+from .moments import Moments
 from .noise_model import Whitener, thin, thinning
 from .path import path_of
 from .sensors import SensorErrors, sensor_errors
