@@ -89,6 +89,7 @@ class Effect:
     ``order`` sorts effects within a slot. ``step_rate`` estimates the fastest rate [1/s] that the effect brings, from
     parameters alone, so that the integrator's step can follow it; ``reach`` says how far back [s] its memory must go
     (one value per sample). ``always_on`` marks base physics.
+    ``alike_without_pressures`` names the family whose members drive and position alone cannot tell apart.
     """
 
     slot: str
@@ -104,6 +105,7 @@ class Effect:
     dynamics: Callable | None = None
     memory: int = 0
     uses: Mapping[str, str] = field(default_factory=dict)
+    alike_without_pressures: str = ""
     order: int = 0
     step_rate: Callable | None = None
     reach: Callable | None = None

@@ -132,6 +132,19 @@ def test_what_the_amplifier_imitates_is_said_before_the_hydraulics_are_blamed() 
     assert verdict.warning(["valve_deadband"], []) == ""
 
 
+def test_without_pressures_a_family_of_effects_is_named_whole(model) -> None:
+    assert verdict.alike(model, ["valve_deadband"], ["position", "pressure_a", "pressure_b"]) == {}
+    found = verdict.alike(model, ["valve_deadband", "entrained_air"], ["position"])
+    assert set(found) == {"valve_deadband"}
+    assert {"stribeck_friction", "backlash", "valve_hysteresis"} <= set(found["valve_deadband"])
+    assert "coulomb_friction" not in found["valve_deadband"]  # on already
+    assert set(verdict.alike(model, ["sensor_lag"], ["position"])["sensor_lag"]) == {
+        "command_delay",
+        "spool_dynamics",
+        "sensor_delay",
+    }
+
+
 def test_unusable_input_is_named(model) -> None:
     with pytest.raises(DiagnosisError, match="no record"):
         diagnose(model, [])

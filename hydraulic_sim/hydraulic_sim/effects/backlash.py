@@ -76,6 +76,7 @@ EFFECT = Effect(
     source="Nordin & Gutman (2002), Automatica 38(10)",
     excited_by="reversals, slow and fast",
     confused_with=("valve_hysteresis", "valve_deadband", "presliding"),
+    alike_without_pressures="sticking",
     told_apart_by="a width that does not depend on speed",
     step_rate=rate,
 )

@@ -31,5 +31,6 @@ EFFECT = Effect(
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",
     excited_by="rest at several positions",
     confused_with=("valve_null_bias", "pressure_offset", "friction_asymmetry"),
+    alike_without_pressures="offset",
     told_apart_by="load pressure at rest, the same at several positions",
 )

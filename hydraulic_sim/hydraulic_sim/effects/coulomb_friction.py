@@ -35,6 +35,7 @@ EFFECT = Effect(
     source="Merritt (1967), Hydraulic Control Systems, ch. 6; Dahl (1968)",
     excited_by="slow triangle through standstill: the load pressure builds up while the piston sticks",
     confused_with=("valve_deadband", "backlash"),
+    alike_without_pressures="sticking",
     told_apart_by="slow triangle: load pressure builds up while stuck",
     step_rate=lambda p: dry_friction_rate(p["level"], p),
 )

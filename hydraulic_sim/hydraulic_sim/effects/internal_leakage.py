@@ -32,6 +32,7 @@ EFFECT = Effect(
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",
     excited_by="holding under load: the piston drifts in proportion to the load pressure",
     confused_with=("viscous_friction", "valve_underlap"),
+    alike_without_pressures="damping",
     told_apart_by="flow balance, not force balance",
     step_rate=lambda p: 2.0 * p["coefficient"] * p["bulk_modulus"] / min(p["dead_volume_a"], p["dead_volume_b"]),
 )

@@ -37,6 +37,7 @@ EFFECT = Effect(
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",
     excited_by="chirp and steps",
     confused_with=("spool_dynamics", "sensor_delay", "command_delay"),
+    alike_without_pressures="lag",
     told_apart_by="the pressures lead the position",
     order=5,
 )

@@ -31,6 +31,7 @@ EFFECT = Effect(
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",
     excited_by="the end stops",
     confused_with=("valve_null_bias", "constant_load"),
+    alike_without_pressures="offset",
     told_apart_by="end stops",
     order=40,
 )

@@ -46,6 +46,7 @@ EFFECT = Effect(
     source="Merritt (1967), Hydraulic Control Systems, ch. 7",
     excited_by="chirp or steps up to the valve's bandwidth",
     confused_with=("command_delay", "sensor_lag"),
+    alike_without_pressures="lag",
     told_apart_by="phase over frequency at two amplitudes",
     step_rate=lambda p: 2.0 * math.pi * p["frequency"] if p["frequency"] < IDEAL else 0.0,
 )

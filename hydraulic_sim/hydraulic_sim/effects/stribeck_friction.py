@@ -36,6 +36,7 @@ EFFECT = Effect(
     source="Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30(7)",
     excited_by="the lowest speeds, through standstill",
     confused_with=("coulomb_friction", "presliding"),
+    alike_without_pressures="sticking",
     told_apart_by="the lowest speeds: friction falls as the speed rises",
     step_rate=lambda p: max(dry_friction_rate(p["rise"], p), 0.86 * p["rise"] / (p["speed"] * p["moving_mass"])),
 )

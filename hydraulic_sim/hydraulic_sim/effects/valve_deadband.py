@@ -35,6 +35,7 @@ EFFECT = Effect(
     source="Merritt (1967), Hydraulic Control Systems, ch. 5",
     excited_by="slow triangle through null",
     confused_with=("coulomb_friction", "backlash"),
+    alike_without_pressures="sticking",
     told_apart_by="the load pressure stays flat while the piston stands",
     order=20,
 )

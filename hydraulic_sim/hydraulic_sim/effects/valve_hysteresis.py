@@ -34,6 +34,7 @@ EFFECT = Effect(
     source="Visintin (1994), Differential Models of Hysteresis, ch. III",
     excited_by="small loops of drive at several amplitudes",
     confused_with=("backlash", "coulomb_friction", "valve_deadband", "presliding"),
+    alike_without_pressures="sticking",
     told_apart_by="loop width over amplitude",
     order=20,
 )

@@ -31,6 +31,7 @@ EFFECT = Effect(
     source="Merritt (1967), Hydraulic Control Systems, ch. 5",
     excited_by="rest at zero drive",
     confused_with=("constant_load", "sensor_offset", "friction_asymmetry"),
+    alike_without_pressures="offset",
     told_apart_by="load pressure at rest",
     order=10,
 )

@@ -31,6 +31,7 @@ EFFECT = Effect(
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",
     excited_by="fast strokes at steady speed",
     confused_with=("internal_leakage",),
+    alike_without_pressures="damping",
     told_apart_by="force balance, not flow balance",
     step_rate=lambda p: p["coefficient"] / p["moving_mass"],
 )

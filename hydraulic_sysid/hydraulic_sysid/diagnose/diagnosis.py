@@ -71,7 +71,9 @@ def diagnose(
     except (SegmentError, CalibrationError) as error:
         raise DiagnosisError(str(error)) from None
     others = {name: rivals(name, stage, found.final.level) for name, stage in found.rivals.items()}
-    kind = verdict.kind_of(found, others)
+    channels = {c for p in parts.pieces for c in p.channels}
+    family = verdict.alike(model, found.added, sorted(channels))
+    kind = verdict.kind_of(found, others, family)
     curves: list[Shape] = []
     if kind == verdict.OUTSIDE:
         curves = shapes(found.final.anchor, say)
@@ -80,12 +82,10 @@ def diagnose(
     known = parameter_errors(found.final.anchor)
     diagnosed = finished(found, known, records, held_out)
     result = document(model, records, held_out, parts, settings, found, others, known, kind, curves, before, after)
-    tied = {
-        rival.name: next(t for t in found.rivals[name].trials if t.name == rival.name).refit.model
-        for name, every in others.items()
-        for rival in every
-        if not rival.told_apart and kind == verdict.TIED
-    }
+    tied = {}
+    for name in found.added if kind == verdict.TIED else ():
+        same = verdict.same_as(name, others, family)
+        tied.update({t.name: t.refit.model for t in found.rivals[name].trials if t.name in same})
     return Diagnosis(diagnosed, tied, result)
 
 

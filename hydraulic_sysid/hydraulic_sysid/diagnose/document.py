@@ -34,7 +34,9 @@ def document(
 ) -> dict[str, Any]:  # fmt: skip
     """The document; arrays NumPy, SI."""
     base, final = found.base, found.final
-    named = _named(found, rivals, kind)
+    channels = list(dict.fromkeys(c for p in parts.pieces for c in p.channels))
+    family = verdict.alike(model, found.added, channels)
+    named = _named(found, rivals, kind, family)
     imitations = verdict.imitated([*records, *held_out])
     effects = _effects(found, rivals, known)
     levels = {"explained": final.level.variance <= 1.0 + 2.0 * verdict.UNSEEN, "off": kind == verdict.OUTSIDE}
@@ -52,14 +54,14 @@ def document(
             }
             for r in (*records, *held_out)
         ],  # fmt: skip
-        "channels": list(dict.fromkeys(c for p in parts.pieces for c in p.channels)),
+        "channels": channels,
         "noise_floor": _noise(parts),
         "verdict": {
             "kind": kind,
             "level": "explained" if levels["explained"] else "off" if levels["off"] else "close",
             "effects": named,
             "subsystem": _subsystem(found, kind, shapes, after or before),
-            "text": verdict.sentences(found, rivals, kind, shapes) + verdict.warning(named, imitations),
+            "text": verdict.sentences(found, rivals, kind, shapes, family) + verdict.warning(named, imitations),
             "imitated": imitations,
         },
         "error": {"unit": "residual over noise", "before": _level(base.level), "after": _level(final.level)},
@@ -111,10 +113,12 @@ def _level(at: Level) -> dict[str, float]:
     return {"fitted": at.rms_fitted, "held_out": at.rms_held_out}
 
 
-def _named(found: Found, rivals: Mapping[str, Sequence[Rival]], kind: str) -> list[str]:
+def _named(
+    found: Found, rivals: Mapping[str, Sequence[Rival]], kind: str, family: Mapping[str, Sequence[str]]
+) -> list[str]:
     names = list(found.added)
     if kind == verdict.TIED:
-        names += [r.name for name in found.added for r in rivals.get(name, ()) if not r.told_apart]
+        names += [other for name in found.added for other in verdict.same_as(name, rivals, family)]
     return list(dict.fromkeys(names))
 
 

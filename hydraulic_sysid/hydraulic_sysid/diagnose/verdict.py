@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from hydraulic_sim.model import Model
 from hydraulic_sysid.records import Record
 
+from .candidates import candidates
 from .rivals import Rival
 from .search import Found
 from .shape import Shape
@@ -21,6 +23,23 @@ STRAINED = 0.01  # the same where an effect fits only with its shape at the end 
 LARGE = 1.03  # residual over noise from which something is missing although no effect of the library is
 
 
+def alike(model: Model, added: Sequence[str], channels: Sequence[str]) -> dict[str, list[str]]:
+    """Effects found → those that these channels cannot tell from them, however well one of them fits.
+
+    Without pressures a family of effects acts alike on the position, up to parameters that no record shows.
+    """
+    if model.kind != "hydraulic" or any(c.startswith("pressure_") for c in channels):
+        return {}
+    off = [e for e in candidates(model) if e.alike_without_pressures]
+    found = {}
+    for name in added:
+        family = model.library[name].alike_without_pressures
+        same = [e.name for e in off if family and e.alike_without_pressures == family and e.name not in added]
+        if same:
+            found[name] = same
+    return found
+
+
 def left_over(found: Found) -> float:
     """Mean square beyond the noise, over that before anything was added (0…1)."""
     base, final = found.base.level, found.final.level
@@ -29,7 +48,9 @@ def left_over(found: Found) -> float:
     return left / seen if seen > 0.0 else 0.0
 
 
-def kind_of(found: Found, rivals: Mapping[str, Sequence[Rival]]) -> str:
+def kind_of(
+    found: Found, rivals: Mapping[str, Sequence[Rival]], family: Mapping[str, Sequence[str]] | None = None
+) -> str:
     """The verdict's kind."""
     final = found.final.level
     if not found.added:
@@ -37,7 +58,7 @@ def kind_of(found: Found, rivals: Mapping[str, Sequence[Rival]]) -> str:
     allowed = STRAINED if strained(found) else UNEXPLAINED
     if left_over(found) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
-    return TIED if any(not r.told_apart for every in rivals.values() for r in every) else MISSING
+    return TIED if family or any(not r.told_apart for every in rivals.values() for r in every) else MISSING
 
 
 def strained(found: Found) -> list[str]:
@@ -54,7 +75,19 @@ def strained(found: Found) -> list[str]:
     return keys
 
 
-def sentences(found: Found, rivals: Mapping[str, Sequence[Rival]], kind: str, shapes: Sequence[Shape]) -> str:
+def same_as(name: str, rivals: Mapping[str, Sequence[Rival]], family: Mapping[str, Sequence[str]] | None) -> list[str]:
+    """What cannot be told from an effect that was found: by the errors, or by the channels."""
+    tied = [r.name for r in rivals.get(name, ()) if not r.told_apart]
+    return list(dict.fromkeys([*tied, *(family or {}).get(name, ())]))
+
+
+def sentences(
+    found: Found,
+    rivals: Mapping[str, Sequence[Rival]],
+    kind: str,
+    shapes: Sequence[Shape],
+    family: Mapping[str, Sequence[str]] | None = None,
+) -> str:
     """What a user reads first."""
     base, final = found.base.level.rms_held_out, found.final.level.rms_held_out
     fell = f"On held-out data the residual went from {base:.3g} to {final:.3g} times the noise."
@@ -68,9 +101,12 @@ def sentences(found: Found, rivals: Mapping[str, Sequence[Rival]], kind: str, sh
     if kind == TIED:
         parts = []
         for name in found.added:
-            same = [r.name for r in rivals.get(name, ()) if not r.told_apart]
+            same = same_as(name, rivals, family)
             parts.append(f"one of {{{', '.join([name, *same])}}}" if same else name)
-        return f"Missing: {_and(parts)}; these data cannot tell {'them' if len(parts) == 1 else 'all'} apart. {fell}"
+        why = " Pressures would: without them these act alike on the position." if family else ""
+        return (
+            f"Missing: {_and(parts)}; these data cannot tell {'them' if len(parts) == 1 else 'all'} apart. {fell}{why}"
+        )
     text = "Outside the library: something is left that no effect of it explains. "
     if found.added:
         text += f"The nearest is {_and(found.added)}. {fell} "
