@@ -144,6 +144,10 @@ def _valve(s: Signals, k: Knots, waves: Array, spool: bool) -> Family:
     for tent in tents(s.time, k.time):
         add("time", tent)
         add("time", tent * demand)
+    pa, at, pb, bt = s.drops()
+    out = demand >= 0.0
+    for drop in (np.where(out, pa, pb), np.where(out, bt, at)):
+        add("pressure", demand * drop)  # flow forces close the spool (Merritt 1967, ch. 5)
     centre_a, centre_b = s.centre_gains()
     for width in (*_WIDTHS, 0.1, np.inf):
         near = np.maximum(1.0 - np.abs(demand) / width, 0.0)
