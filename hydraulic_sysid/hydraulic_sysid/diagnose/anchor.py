@@ -76,7 +76,7 @@ class Anchor:
                 Linear(*(a[chosen[i]] for a in (self.linear[i].raw, self.linear[i].basis, self.linear[i].back)))
                 for i in used
             ],
-            [self.columns[i][chosen[i]] for i in used],
+            [self.columns[i][chosen[i]] for i in used] if self.columns else [],
             [self.beyond[i][chosen[i]] for i in used],
         )
 

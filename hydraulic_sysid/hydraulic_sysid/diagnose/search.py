@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
@@ -33,9 +34,11 @@ DISTANT = 0.1  # of what an effect repairs, by which a quick refit in its place 
 SETTLED = 0.006  # mean square beyond the noise below which nothing more is looked for
 MOST_SWAPS = 3
 HOPELESS = 0.6  # of what noise does not explain: where less is repaired, exchanging effects will not do either
+PROMISED = 0.5  # of what an effect must repair, which its quick refit must show for it to be fitted to the end
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended
 
 Say = Callable[[str], None]
+Enough = Callable[[Level, float], bool]
 
 
 @dataclass(frozen=True)
@@ -99,9 +102,12 @@ class Search:
         trials.sort(key=lambda t: t.level.total)
         return replace(base, anchor=point.slim(), trials=trials, prospects=found)
 
-    def finish(self, base: Stage) -> Stage | None:
-        """The best of the trials, fitted to the end; None where none is worth it."""
-        worth = [t for t in base.trials if material(base.level, t.level)]
+    def finish(self, base: Stage, enough: Enough) -> Stage | None:
+        """The best of the trials, fitted to the end; None where none is worth it.
+
+        ``enough(level, part)``: whether a level is a part of the way to being worth it.
+        """
+        worth = [t for t in base.trials if material(base.level, t.level) and enough(t.level, PROMISED)]
         if not worth:
             return None
         top = base.level.total - worth[0].level.total
@@ -112,7 +118,7 @@ class Search:
                 found.append(self.stage(trial.refit.model, replace(self.settings, most_steps=LAST_STEPS)))
             except SimulationError:
                 continue
-        found = [f for f in found if material(base.level, f.level)]
+        found = [f for f in found if material(base.level, f.level) and enough(f.level, 1.0)]
         return min(found, key=lambda f: f.level.total, default=None)
 
     def run(self, model: Model) -> Found:
@@ -122,8 +128,8 @@ class Search:
         added: list[str] = []
         path = [stage]
         while len(added) < MOST_EFFECTS:
-            better = self.finish(path[-1])
-            if better is None or not self._worth(base.level, path[-1].level, better.level, bool(added)):
+            better = self.finish(path[-1], partial(_worth, base.level, path[-1].level) if added else _anything)
+            if better is None:
                 break
             added.append(_new(better, path[-1]))
             nothing = better.level.variance - 1.0 < SETTLED
@@ -137,12 +143,6 @@ class Search:
         if kept == added:
             return Found(base, final, added, [(n, p.level) for n, p in zip(added, path[1:], strict=True)], rivals)
         return Found(base, final, kept, self._steps(base, final, kept), rivals)
-
-    def _worth(self, base: Level, before: Level, after: Level, further: bool) -> bool:
-        """Whether a further effect repairs a good part of what is left, or of what there was."""
-        if not further:
-            return True
-        return repaired(before, after) >= FURTHER or repaired(base, after) - repaired(base, before) >= NEEDED
 
     def _review(
         self, base: Stage, stage: Stage, added: list[str], rivals: dict[str, Stage]
@@ -177,7 +177,7 @@ class Search:
             if not close or repaired(base.level, stage.level) < HOPELESS:
                 continue
             without = replace(without, trials=close)
-            other = self.finish(without)
+            other = self.finish(without, _anything)
             if (
                 other is not None
                 and name not in other.model.effects
@@ -211,6 +211,20 @@ class Search:
             steps.append((name, self.stage(model).level))
         added[:] = order
         return steps
+
+
+def _worth(base: Level, before: Level, after: Level, part: float) -> bool:
+    """Whether a further effect repairs enough (times ``part``): a good part of what is left, or something of what there
+    was, where the others repair most of it. What repairs little where most is left would be a stand-in."""
+    if repaired(before, after) >= part * FURTHER:
+        return True
+    most = repaired(base, before) >= HOPELESS
+    return most and repaired(base, after) - repaired(base, before) >= part * NEEDED
+
+
+def _anything(after: Level, part: float) -> bool:
+    """No more is asked than that a gain is one."""
+    return True
 
 
 def _new(stage: Stage, before: Stage) -> str:
