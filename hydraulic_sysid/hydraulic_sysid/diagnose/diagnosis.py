@@ -20,10 +20,10 @@ from .anchor import bounded
 from .document import document
 from .errors import Known, parameter_errors
 from .hints import hints
-from .levels import Level
+from .levels import Level, repaired
 from .pieces import split
 from .rivals import rivals
-from .search import Found, Search, Stage
+from .search import HOPELESS, Found, Search, Stage
 from .shape import Shape, shapes
 
 
@@ -76,7 +76,9 @@ def diagnose(
     kind = verdict.kind_of(found, others, family)
     curves: list[Shape] = []
     if kind == verdict.OUTSIDE:
-        curves = shapes(found.final.anchor, say)
+        # Where most is left, what was added stands in for something else, and bends the curves.
+        stand_in = repaired(found.base.level, found.final.level) < HOPELESS
+        curves = shapes((found.base if stand_in else found.final).anchor, say)
     say("balances")
     before, after = _balances(found.base, records), _balances(found.final, records) if found.added else None
     known = parameter_errors(found.final.anchor)
