@@ -19,6 +19,10 @@ PATIENCE_S = 60.0
 # Fast DDS drops an answer when it has not yet found the asking client after 100 ms, which a loaded machine exceeds.
 ASK_AGAIN_S = 8.0
 
+# Started with `nohup … &`, this process and with it all that it starts would ignore SIGINT, which tests send.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 
 def _wait_until(condition: Callable[[], Any], what: str, patience: float = PATIENCE_S) -> Any:
     """The first true value of `condition`; fails the test with `what` if none comes in time."""

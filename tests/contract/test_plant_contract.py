@@ -67,16 +67,26 @@ def test_names_types_and_qos(start: Any, client: Any, wait_until: Any) -> None:
         look = client.node.get_publishers_info_by_topic
         if row.name == "command":
             look = client.node.get_subscriptions_info_by_topic
-        infos = wait_until(partial(look, absolute(row.name)), f"the plant on {row.name}")
+        infos = wait_until(partial(known, look, absolute(row.name)), f"the plant on {row.name}")
         assert len(infos) == 1
         assert (infos[0].node_namespace, infos[0].node_name) == ("/actuator", "plant")
         assert infos[0].topic_type == row.type
         qos = infos[0].qos_profile
         assert qos.reliability.name == "RELIABLE"
         assert qos.durability.name == ("TRANSIENT_LOCAL" if row.qos == "latched" else "VOLATILE")
-    served = dict(client.node.get_service_names_and_types_by_node("plant", "/actuator"))
-    for row in SERVICES:
-        assert served[absolute(row.name)] == [row.type]
+    expected = {(absolute(row.name), (row.type,)) for row in SERVICES}
+
+    def served() -> bool:
+        found = client.node.get_service_names_and_types_by_node("plant", "/actuator")
+        return expected <= {(name, tuple(types)) for name, types in found}
+
+    wait_until(served, f"the services {expected}")
+
+
+def known(look: Callable[[str], list[Any]], name: str) -> list[Any]:
+    """End points of a topic; empty until the names of all their nodes have come as well."""
+    infos = look(name)
+    return infos if all("UNKNOWN" not in info.node_name for info in infos) else []
 
 
 def test_lifecycle_round_trip(start: Any, client: Any, wait_until: Any) -> None:
@@ -103,10 +113,17 @@ def test_lifecycle_round_trip(start: Any, client: Any, wait_until: Any) -> None:
 def test_samples_share_stamps_on_the_grid(start: Any, client: Any, wait_until: Any) -> None:
     streams = {name: client.collect(name) for name in ("state", "pressure_a", "pressure_b", "pressure_supply")}
     start()
-    wait_until(lambda: min(map(len, streams.values())) > 500, "500 samples of each")
-    stamps = {name: [from_time(m.header.stamp) for m in list(heard)][:400] for name, heard in streams.items()}
-    first = max(times[0] for times in stamps.values())
-    common = {name: [t for t in times if t >= first][:300] for name, times in stamps.items()}
+    wait_until(lambda: min(map(len, streams.values())) > 0, "a sample of each")
+    first = max(from_time(heard[0].header.stamp) for heard in streams.values())  # from then on all are heard
+
+    def stamps() -> dict[str, list[int]]:
+        return {
+            name: [t for m in list(heard) if (t := from_time(m.header.stamp)) >= first]
+            for name, heard in streams.items()
+        }
+
+    wait_until(lambda: min(map(len, stamps().values())) >= 300, "300 samples of each")
+    common = {name: times[:300] for name, times in stamps().items()}
     assert len({tuple(times) for times in common.values()}) == 1
     steps = {b - a for a, b in zip(common["state"], common["state"][1:], strict=False)}
     assert all(step > 0 and step % 1_000_000 == 0 for step in steps)
@@ -126,7 +143,9 @@ def test_moves_only_when_enabled_and_stops_when_the_source_falls_silent(
     states, health = client.collect("state"), client.diagnostics()
     source = client.source("hand", 0.5)
     wait_until(lambda: health.count("disabled") > 0, "commands refused because nothing is enabled")
-    assert applied(states) == 0.0
+    refused = len(states)
+    wait_until(lambda: len(states) > refused + 20, "states after refused commands")
+    assert set(map(millivolts, states)) == {0.0}
     enabled(client, wait_until)
     wait_until(lambda: applied(states) == 0.5, "the commanded drive")
     source.stop()
@@ -144,8 +163,10 @@ def test_positive_drive_extends(start: Any, client: Any, wait_until: Any) -> Non
     enabled(client, wait_until)
     origin = wait_until(lambda: states and states[-1], "a state").position[0]
     client.source("hand", 1.0)
-    wait_until(lambda: states[-1].position[0] > origin + 1e-4, "a piston that extends")
-    assert states[-1].velocity[0] > 0.0
+    state = wait_until(
+        lambda: next((s for s in states[-200:] if s.position[0] > origin + 1e-4), None), "a piston that extends"
+    )
+    assert state.velocity[0] > 0.0
 
 
 def test_out_of_range_is_clamped_and_nonsense_rejected(start: Any, client: Any, wait_until: Any) -> None:
@@ -262,7 +283,8 @@ def test_parameters_are_described_and_guarded(start: Any, client: Any, wait_unti
 def test_diagnostics_report_timing(start: Any, client: Any, wait_until: Any) -> None:
     health = client.diagnostics()
     start()
-    wait_until(lambda: health.count("samples") > 1000, "a second of samples")
+    wait_until(lambda: health.count("samples") > 200, "some samples")
+    wait_until(lambda: float(health["rate_Hz"] or "nan") > 0.0, "a rate")
     values = health.values()
     assert float(values["rate_Hz"]) > 0.0 and float(values["run_jitter_p99_ms"]) >= 0.0
     assert {"overruns", "skipped", "age_s", "applied_drive_V", "source", "fault"} <= set(values)

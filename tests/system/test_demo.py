@@ -252,7 +252,13 @@ def test_records_of_ones_own_need_no_graph(tmp_path: Path) -> None:
     run = finished(Demo.start(tmp_path, "--record", str(SAMPLE), "--model", "sample_bench"))
     assert run.code == 0, run.errors
     assert run.left == {}
-    assert {path.name for path in run.out.iterdir()} == {"report.html", "identify.json", "compare.json"}
+    assert {path.name for path in run.out.iterdir()} == {
+        "report.html",
+        "identify.json",
+        "compare.json",
+        "diagnose.json",
+        "model.yaml",
+    }
     compared = run.result("compare")
     assert [r["name"] for r in compared["records"]] == ["multisine", "steps", "triangle"]
     assert compared["model"]["name"] == "sample_bench"
