@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from typing import Any, Protocol
 
 import can
@@ -21,6 +22,7 @@ from hydraulic_interfaces.pacing import Pacer
 # How long before the SYNC the drive is sent, as a share of the period: the frame itself (100 us at 1 Mbit/s) and the
 # jitter of the loop must fit; only that of sending where the loop sends both.
 _KERNEL_LEAD, _LOOP_LEAD = 0.25, 0.15
+_HEARD = 15  # SYNCs of the kernel whose median instant is gone by
 
 
 class Beat(Protocol):
@@ -83,13 +85,14 @@ class KernelBeat:
         self._master, self._frames, self._period_ns = master, frames, period_ns
         self.lead_ns = round(_KERNEL_LEAD * period_ns)
         self._task: Any = None
-        self._seen = 0
+        self._heard: deque[int] = deque(maxlen=_HEARD)
 
     def start(self) -> None:
         """Hand the SYNC over to the kernel.
 
         :raises BusDownError: it does not take it.
         """
+        self._heard.clear()
         message = can.Message(arbitration_id=SYNC, is_extended_id=False)
         try:
             self._task = self._master.can.send_periodic(message, self._period_ns * 1e-9)
@@ -103,16 +106,20 @@ class KernelBeat:
             self._task = None
 
     def first_instant(self, earliest_ns: int) -> int:
-        """The lead before a SYNC, of which one has just been heard."""
-        self._seen = self._frames.cycle
-        # The frame's stamp is wall time.
-        heard = self._frames.sync_ns - time.time_ns() + time.monotonic_ns() - self.lead_ns
+        """The lead before a SYNC. A few have been heard; one alone may have been sent late."""
+        newest, half = self._frames.sync_ns, self._period_ns // 2
+        off = sorted((s - newest + half) % self._period_ns - half for s in (*self._heard, newest))
+        # The frames' stamps are wall time.
+        heard = newest + off[len(off) // 2] - time.time_ns() + time.monotonic_ns() - self.lead_ns
         return heard + -(-(earliest_ns - heard) // self._period_ns) * self._period_ns
 
     def exchange(self, cob_id: int, drive_frame: bytes, sync_ns: int) -> bool:
         """See `Beat.exchange`."""
-        in_time = self._frames.cycle == self._seen
+        # Told by the clock and not by counting SYNCs: what was missed once must not be missed ever after.
+        late = self._frames.sync_ns > sync_ns - self._period_ns // 2
+        seen = self._frames.cycle
         self._master.send(cob_id, drive_frame)
-        came = self._frames.wait_sync(self._seen, time.monotonic() + 1.5e-9 * self._period_ns)
-        self._seen = self._frames.cycle
-        return came and in_time
+        came = late or self._frames.wait_sync(seen, time.monotonic() + 1.5e-9 * self._period_ns)
+        if came:
+            self._heard.append(self._frames.sync_ns)
+        return came and not late

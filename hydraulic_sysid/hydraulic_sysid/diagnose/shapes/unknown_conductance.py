@@ -31,7 +31,9 @@ EFFECT = Effect(
     summary="a leak across the piston of any shape",
     kernel=add,
     parameters=(
-        Parameter("height", "m^3/(s*Pa)", 1e-12, (-1.0, 1.0), "height of the triangle", "shape of a residual", null=0.0),
+        Parameter(
+            "height", "m^3/(s*Pa)", 1e-12, (-1.0, 1.0), "height of the triangle", "shape of a residual", null=0.0
+        ),
         Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", "shape of a residual", free=False),
         Parameter(
             "centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", "shape of a residual", free=False
