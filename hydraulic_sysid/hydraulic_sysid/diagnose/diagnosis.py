@@ -17,13 +17,13 @@ from hydraulic_sysid.records import Record
 
 from . import verdict
 from .anchor import bounded
-from .document import document
+from .document import add_balances, document
 from .errors import Known, parameter_errors
 from .hints import hints
 from .levels import Level, repaired
 from .pieces import split
 from .rivals import rivals
-from .search import HOPELESS, Found, Search, Stage
+from .search import HOPELESS, Found, Search
 from .shape import Shape, shapes
 
 
@@ -75,25 +75,28 @@ def diagnose(
     family = verdict.alike(model, found.added, sorted(channels))
     kind = verdict.kind_of(found, others, family)
     curves: list[Shape] = []
+    # Where most is left, what was added stands in for something else, and bends curves and balances.
+    stand_in = repaired(found.base.level, found.final.level) < HOPELESS
     if kind == verdict.OUTSIDE:
-        # Where most is left, what was added stands in for something else, and bends the curves.
-        stand_in = repaired(found.base.level, found.final.level) < HOPELESS
         curves = shapes((found.base if stand_in else found.final).anchor, say)
-    say("balances")
-    before, after = _balances(found.base, records), _balances(found.final, records) if found.added else None
     known = parameter_errors(found.final.anchor)
     diagnosed = finished(found, known, records, held_out)
-    result = document(model, records, held_out, parts, settings, found, others, known, kind, curves, before, after)
+    result = document(model, records, held_out, parts, settings, found, others, known, kind, curves)
     tied = {}
     for name in found.added if kind == verdict.TIED else ():
         same = verdict.same_as(name, others, family)
         tied.update({t.name: t.refit.model for t in found.rivals[name].trials if t.name in same})
+    say("balances")
+    base, final, added = found.base.model, found.final.model, bool(found.added)
+    del found  # its sensitivities would take up the memory that the balances need
+    before, after = _balances(base, records), _balances(final, records) if added else None
+    add_balances(result, before, after, before if stand_in else after or before)
     return Diagnosis(diagnosed, tied, result)
 
 
-def _balances(stage: Stage, records: Sequence[Record]) -> dict[str, Any] | None:
+def _balances(model: Model, records: Sequence[Record]) -> dict[str, Any] | None:
     try:
-        return locate(stage.model, records, maps=False)
+        return locate(model, records, maps=False)
     except (LocateError, SimulationError):
         return None
 

@@ -25,14 +25,15 @@ from .search import Found
 from .shape import Shape
 
 _NEAREST = 3
+_TELLING = 0.5  # share of what is left, from which a curve says where it is
 
 
 def document(
     model: Model, records: Sequence[Record], held_out: Sequence[Record], parts: Split, settings: Settings,
     found: Found, rivals: Mapping[str, Sequence[Rival]], known: Mapping[str, Known], kind: str,
-    shapes: Sequence[Shape], before: dict[str, Any] | None, after: dict[str, Any] | None,
+    shapes: Sequence[Shape],
 ) -> dict[str, Any]:  # fmt: skip
-    """The document; arrays NumPy, SI."""
+    """The document, still without balances (`add_balances`); arrays NumPy, SI."""
     base, final = found.base, found.final
     channels = list(dict.fromkeys(c for p in parts.pieces for c in p.channels))
     family = verdict.alike(model, found.added, channels)
@@ -60,7 +61,7 @@ def document(
             "kind": kind,
             "level": "explained" if levels["explained"] else "off" if levels["off"] else "close",
             "effects": named,
-            "subsystem": _subsystem(found, kind, shapes, after or before),
+            "subsystem": _subsystem(found, kind, shapes),
             "text": verdict.sentences(found, rivals, kind, shapes, family) + verdict.warning(named, imitations),
             "imitated": imitations,
         },
@@ -84,7 +85,7 @@ def document(
         "left_over": verdict.left_over(found),
         "shapes": [_shape(s) for s in shapes],
         "nearest": [t.name for t in final.trials[:_NEAREST]] if kind == verdict.OUTSIDE else [],
-        "balances": _balances(before, after),
+        "balances": [],
         "curves": curves(parts, base.anchor, final.anchor),
     }
 
@@ -94,7 +95,7 @@ def added_document(
     found: Found, known: Mapping[str, Known], confirmed: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """The document of one effect added on request: the same keys, as far as they apply."""
-    whole = document(model, records, held_out, parts, settings, found, {}, known, verdict.MISSING, (), None, None)
+    whole = document(model, records, held_out, parts, settings, found, {}, known, verdict.MISSING, ())
     before, after = found.base.level.rms_held_out, found.final.level.rms_held_out
     name = found.added[0]
     whole |= heading("add")
@@ -201,17 +202,24 @@ def _noise(parts: Split) -> dict[str, dict[str, float]]:
     return found
 
 
-def _subsystem(found: Found, kind: str, shapes: Sequence[Shape], balances: dict[str, Any] | None) -> str | None:
-    """Where it is: of the effects found, of the curve that explains the rest, or of the balance that is violated."""
+def _subsystem(found: Found, kind: str, shapes: Sequence[Shape]) -> str | None:
+    """Where it is: of the first effect found, or of the curve that explains most of what no effect does."""
     if kind == verdict.COMPLETE:
         return None
     if kind != verdict.OUTSIDE:
         return subsystem(found.base.model.library[found.added[0]])
-    if shapes and shapes[0].share > 0.5:
-        return shapes[0].subsystem
-    if balances and balances.get("subsystem"):
-        return str(balances["subsystem"][0]["name"])
     return shapes[0].subsystem if shapes else None
+
+
+def add_balances(
+    result: dict[str, Any], before: dict[str, Any] | None, after: dict[str, Any] | None, blamed: dict[str, Any] | None
+) -> None:
+    """Put the balances into a document. ``blamed``: those that say where something outside the library is, unless a
+    curve explains most of it."""
+    result["balances"] = _balances(before, after)
+    curve = result["shapes"][0]["share"] if result["shapes"] else 0.0
+    if result["verdict"]["kind"] == verdict.OUTSIDE and curve <= _TELLING and blamed and blamed.get("subsystem"):
+        result["verdict"]["subsystem"] = str(blamed["subsystem"][0]["name"])
 
 
 def _shape(s: Shape) -> dict[str, Any]:

@@ -9,7 +9,7 @@ that no file of the library knows moves the balances in these directions all the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -49,18 +49,27 @@ class Family:
         self.parts.append(parts)
 
 
-def families(s: Signals, balances: tuple[str, ...], k: Knots, waves: Array) -> list[Family]:
-    """All subsystems that these balances can show; ``waves`` (W, n) are oscillations that any of them may have."""
-    found = [_force(s, k, waves)] if "force" in balances else []
+def families(s: Signals, balances: tuple[str, ...], k: Knots, waves: Array) -> Iterator[Family]:
+    """All subsystems that these balances can show, one at a time, as each is large.
+
+    ``waves`` (W, n) are oscillations that any of them may have.
+    """
+    if "force" in balances:
+        yield _force(s, k, waves)
     if not s.hydraulic:
-        return [*found, _drive(s, k), _sensor(s, k, waves)]
-    if "flow_a" in balances or "flow_b" in balances:
-        found += [_valve(s, k, waves, "spool" in balances), _flow(s, k), _fluid(s, k)]
-        found += [_supply(s, k, waves, "supply" in balances), _sensor(s, k, waves)]
+        yield _drive(s, k)
+        yield _sensor(s, k, waves)
+    elif "flow_a" in balances or "flow_b" in balances:
+        yield _valve(s, k, waves, "spool" in balances)
+        yield _flow(s, k)
+        yield _fluid(s, k)
+        yield _supply(s, k, waves, "supply" in balances)
+        yield _sensor(s, k, waves)
     else:
-        found += [_valve(s, k, waves, True)] if "spool" in balances else []
-        found += [_supply(s, k, waves, True)] if "supply" in balances else []
-    return found
+        if "spool" in balances:
+            yield _valve(s, k, waves, True)
+        if "supply" in balances:
+            yield _supply(s, k, waves, True)
 
 
 def turning(s: Signals, noise: float) -> Array:

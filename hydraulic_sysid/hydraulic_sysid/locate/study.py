@@ -14,7 +14,7 @@ from hydraulic_sysid.records import Record
 
 from .balances import Balances, Residuals
 from .blame import PARAMETERS
-from .directions import families, turning
+from .directions import Family, families, turning
 from .knots import Knots
 from .lines import waves
 from .moments import Moments
@@ -102,17 +102,11 @@ def moments(
     """
     names = s.names
     subsystems, variables, found = [], [], []
-    for family in families(side.signals, names, knots, waves(lines, side.signals.time, record, records)):
-        groups: dict[tuple[int, ...], list[int]] = {}
-        for i, parts in enumerate(family.parts):
-            rows = tuple(k for k, n in enumerate(names) if n in parts)
-            if rows:
-                groups.setdefault(rows, []).append(i)
-        for rows, members in groups.items():
-            values = np.array([[family.parts[i][names[k]] for k in rows] for i in members])
-            found.append(s.whitener(thin(values, s.factor), rows))
-            subsystems += [family.subsystem] * len(members)
-            variables += [family.variables[i] for i in members]
+    shapes = families(side.signals, names, knots, waves(lines, side.signals.time, record, records))
+    for parts, subsystem, over in map(lambda family: _thinned(s, family), shapes):  # which keeps no family alive
+        found += parts
+        subsystems += [subsystem] * len(over)
+        variables += over
     turns = np.zeros((0, *s.moved.shape[1:]))
     if "force" in names:
         turns = s.whitener(thin(turning(side.signals, s.data.noise["position"])[:, None], s.factor), (0,))
@@ -120,6 +114,21 @@ def moments(
     edge = max(1, int(round(_EDGE * s.rate)))
     made = Moments.of(np.concatenate((given, *found))[..., edge:-edge], side.white[:, edge:-edge], s.rate)
     return made, [PARAMETERS] * len(given) + subsystems, [""] * len(given) + variables
+
+
+def _thinned(s: Study, family: Family) -> tuple[list[Array], str, list[str]]:
+    """Directions of a subsystem, thinned and whitened (K, B, m), its name, and the variable of each direction."""
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for i, parts in enumerate(family.parts):
+        rows = tuple(k for k, n in enumerate(s.names) if n in parts)
+        if rows:
+            groups.setdefault(rows, []).append(i)
+    found, over = [], []
+    for rows, members in groups.items():
+        values = np.array([[thin(family.parts[i][s.names[k]], s.factor) for k in rows] for i in members])
+        found.append(s.whitener(values, rows))
+        over += [family.variables[i] for i in members]
+    return found, family.subsystem, over
 
 
 def size_of(balances: Balances, key: str) -> float:
