@@ -42,7 +42,9 @@ case "$*" in
     done ;;
 *"-m ruff"*) [ ! -e "$BREAK" ] || { echo "E501 line too long"; exit 1; } ;;
 *"-m mypy"*) echo "Success: no issues found" ;;
-*"-m pytest"*) echo "collected 2 items"; echo "=== 2 passed in 0.01s ===" ;;
+*"-m pytest"*"tests/$LEAKS"*) echo "test_seal.py F"; echo "=== 1 failed, 1 passed, 2 errors in 0.02s ==="; exit 1 ;;
+*"-m pytest"*"tests/$BURSTS"*) echo "Segmentation fault"; exit 139 ;;
+*"-m pytest"*) echo "collected 2 items"; echo "=== 2 passed, 1 warning in 0.01s ===" ;;
 esac
 """
 
@@ -60,6 +62,8 @@ class FakeCheckout:
             "BENCH_PYTHON": sys.executable,
             "CALLS": str(self.calls_file),
             "BREAK": str(self.broken),
+            "LEAKS": "nowhere",
+            "BURSTS": "nowhere",
         }
         root.mkdir(exist_ok=True)
         shutil.copy(ROOT / "bench", root)
@@ -362,7 +366,7 @@ def test_test_runs_ruff_mypy_and_pytest(built: FakeCheckout) -> None:
     answer = built.bench("test")
     assert answer.returncode == 0
     assert [call.split()[1] for call in built.calls()] == ["ruff", "mypy", "pytest"]
-    assert answer.stdout.splitlines()[-1] == "=== 2 passed in 0.01s ==="
+    assert answer.stdout.splitlines()[-1] == "=== 2 passed, 1 warning in 0.01s ==="
 
 
 def test_test_with_arguments_runs_only_pytest(built: FakeCheckout) -> None:
@@ -375,7 +379,45 @@ def test_failed_check_fails_the_test_and_the_closing_line_stays_last(built: Fake
     answer = built.bench("test")
     assert answer.returncode == 1
     assert "ruff" in answer.stdout.splitlines()[-2]
-    assert answer.stdout.splitlines()[-1] == "=== 2 passed in 0.01s ==="
+    assert answer.stdout.splitlines()[-1] == "=== 2 passed, 1 warning in 0.01s ==="
+
+
+@pytest.fixture
+def with_tests(built: FakeCheckout) -> FakeCheckout:
+    """A checkout with tests that compute, tests that keep time, and one that needs the machine for itself."""
+    for name in ("sim/test_law.py", "sim/test_pump_node.py", "system/test_vcan.py", "system/test_demo.py"):
+        (built.root / "tests" / name).parent.mkdir(parents=True, exist_ok=True)
+        (built.root / "tests" / name).touch()
+    for name in ("sysid/test_fit.py", "hidden_effects/test_leak.py", "pump/test_pump.py"):
+        (built.root / "tests" / name).parent.mkdir(parents=True, exist_ok=True)
+        (built.root / "tests" / name).touch()
+    return built
+
+
+def test_all_tests_run_once_and_the_closing_line_sums_up(with_tests: FakeCheckout) -> None:
+    answer = with_tests.bench("test")
+    assert answer.returncode == 0, answer.stderr
+    common = " -p no:cacheprovider"
+    assert sorted(call for call in with_tests.calls() if "pytest" in call) == [
+        f"-m pytest tests/hidden_effects tests/sim tests/sysid --ignore-glob=*_node.py{common}",
+        f"-m pytest tests/pump tests/sim/test_pump_node.py{common}",
+        f"-m pytest tests/system --ignore=tests/system/test_vcan.py{common}",
+        f"-m pytest tests/system/test_vcan.py{common}",
+    ]
+    assert answer.stdout.count("collected 2 items") == 4
+    assert answer.stdout.splitlines()[-1].startswith("=== 8 passed, 4 warnings in ")
+
+
+@pytest.mark.parametrize("folder", ["system/test_vcan.py -p", "system --ignore", "pump", "hidden_effects"])
+def test_whichever_run_fails_fails_the_test(with_tests: FakeCheckout, folder: str) -> None:
+    leaks = with_tests.bench("test", LEAKS=folder)
+    assert leaks.returncode == 1
+    assert leaks.stdout.splitlines()[-1].startswith("=== 1 failed, 7 passed, 3 warnings, 2 errors in ")
+    assert "test_seal.py F" in leaks.stdout
+    bursts = with_tests.bench("test", BURSTS=folder)
+    assert bursts.returncode == 139
+    assert bursts.stdout.splitlines()[-1].startswith("=== 6 passed, 3 warnings, 1 errors in ")
+    assert "Segmentation fault" in bursts.stdout
 
 
 # --- lock, interrupts, damage -------------------------------------------------------------------------------------

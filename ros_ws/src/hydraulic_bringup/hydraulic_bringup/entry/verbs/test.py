@@ -1,19 +1,23 @@
 """test [PYTEST ARG …]: build, ruff, mypy and all tests; with arguments only pytest on those.
 
-Tests that only compute run beside the others, at a low priority, and are shown after them. The last line printed is
-pytest's closing line. Exit code 0 only if everything passed.
+All tests run in several pytest processes side by side, whose output is shown one after the other. The last line printed
+is pytest's closing line, or the sum of those. Exit code 0 only if everything passed.
 """
 
 from __future__ import annotations
 
 import codecs
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 from ..bench import Bench
@@ -21,8 +25,12 @@ from ..bench import Bench
 ORDER = 2
 COMPUTING = ("tests/hidden_effects", "tests/sim", "tests/sysid")  # but for their nodes' tests, which keep time
 NODES = "*_node.py"
+MACHINE = "tests/system/test_vcan.py"  # where this kernel has no vcan, a virtual machine that takes all processors
+FIRST = ("tests/system", "tests/contract", "tests/bringup")  # half of the waiting; any other folder goes to the rest
 NICE = 15
 INTERRUPT_S = 15.0  # for pytest to end its node processes and to sum up
+POLL_S = 0.1
+COUNT = re.compile(r"(\d+) (passed|failed|errors?|skipped|xfailed|xpassed|deselected|warnings?)\b")
 
 
 def run(bench: Bench, arguments: list[str]) -> int:
@@ -39,67 +47,133 @@ def run(bench: Bench, arguments: list[str]) -> int:
         print(f"== {name}", flush=True)
         if subprocess.call([python, "-m", *command], cwd=bench.checkout.root, env=variables):
             failed.append(name)
-    print("== pytest", flush=True)
+    root = bench.checkout.root
     pytest = [python, "-m", "pytest"]
-    if arguments or not all((bench.checkout.root / folder).is_dir() for folder in COMPUTING):
-        code, closing = _pytest([*pytest, *arguments], bench, variables)
+    if arguments or not all((root / folder).is_dir() for folder in COMPUTING):
+        here = Path.cwd() if root in Path.cwd().parents else root  # so that given paths mean what they say
+        print("== pytest", flush=True)
+        with Stream.of([*pytest, *arguments], here, variables) as only:
+            closing = only.show()
+        code = only.code
     else:
-        code, closing = _both(pytest, bench, variables)
+        code, closing = _all(pytest, root, variables)
     if failed:
         print(f"Failed before the tests, see above: {', '.join(failed)}\n{closing}", flush=True)
     return code or int(bool(failed))
 
 
-def _both(pytest: list[str], bench: Bench, variables: Mapping[str, str]) -> tuple[int, str]:
-    """All tests, those that only compute beside the others; the worse exit code and the last line of those."""
-    root = bench.checkout.root
-    keep_time = [str(d.relative_to(root)) for d in sorted((root / "tests").iterdir()) if any(d.glob("test_*.py"))]
-    keep_time = [folder for folder in keep_time if folder not in COMPUTING]
-    keep_time += [str(f.relative_to(root)) for folder in COMPUTING for f in sorted((root / folder).glob(NODES))]
-    command = [*pytest, *COMPUTING, f"--ignore-glob={NODES}", "-p", "no:cacheprovider"]
-    with tempfile.TemporaryFile() as shown:
-        beside = subprocess.Popen(
-            command, cwd=root, env=variables, stdout=shown, stderr=subprocess.STDOUT, preexec_fn=lambda: os.nice(NICE)
-        )
-        try:
-            code, first = _pytest([*pytest, *keep_time], bench, variables)
-            beside.wait()
-        except BaseException:
-            beside.kill()
-            raise
-        shown.seek(0)
-        text = shown.read().decode(errors="replace")
-    print(f"== pytest: {', '.join(COMPUTING)}\n{text}", end="", flush=True)
-    lines = [line for line in text.splitlines() if line.strip()]
-    if code:
-        print(f"Failed before these, see above: {first}\n{lines[-1] if lines else ''}", flush=True)
-    return code or beside.returncode, lines[-1] if lines else ""
+def _all(pytest: list[str], root: Path, variables: Mapping[str, str]) -> tuple[int, str]:
+    """All tests; the worst exit code, and the sum of the closing lines, which has been printed."""
+    begun = time.monotonic()
+    machine, halves = _keep_time(root)
+    # These need no more than what the others leave of the processors.
+    computing = [*COMPUTING, f"--ignore-glob={NODES}"]
+    streams: list[Stream] = []
+
+    def shown(selection: Sequence[str], stream: Stream) -> None:
+        print(f"== pytest {' '.join(selection)}", flush=True)
+        stream.show()
+        streams.append(stream)
+
+    def start(selection: Sequence[str], nice: int = 0) -> AbstractContextManager[Stream]:
+        return Stream.of([*pytest, *selection, "-p", "no:cacheprovider"], root, variables, nice)
+
+    with start(computing, NICE) as beside:
+        if machine:
+            with start(machine) as alone:
+                shown(machine, alone)
+        with start(halves[0]) as first, start(halves[1]) as second:
+            shown(halves[0], first)
+            shown(halves[1], second)
+        shown(computing, beside)
+    closing = summed([stream.closing for stream in streams], time.monotonic() - begun)
+    bad = [stream for stream in streams if stream.code]
+    if bad:
+        print("Failed, see above:", *(stream.closing for stream in bad), sep="\n  ")
+    print(closing, flush=True)
+    return max((abs(stream.code) for stream in bad), default=0), closing
 
 
-def _pytest(command: list[str], bench: Bench, variables: Mapping[str, str]) -> tuple[int, str]:
-    """Run pytest with its output passed through as it comes; exit code and last line."""
-    terminal = sys.stdout.isatty()
-    size = {"COLUMNS": str(shutil.get_terminal_size().columns)}
-    colour = ["--color=yes"] if terminal else []
-    decoder = codecs.getincrementaldecoder("utf-8")("replace")
-    tail = ""
-    root = bench.checkout.root
-    here = Path.cwd() if root in Path.cwd().parents else root  # so that given paths mean what they say
-    with subprocess.Popen([*command, *colour], cwd=here, env={**variables, **size}, stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        try:
-            while chunk := os.read(process.stdout.fileno(), 65536):
-                text = decoder.decode(chunk)
+def _keep_time(root: Path) -> tuple[list[str], tuple[list[str], list[str]]]:
+    """Selections of the tests that keep time: what has to have the machine for itself, and two halves of the rest."""
+    machine = [MACHINE] if (root / MACHINE).is_file() else []
+    folders = [str(d.relative_to(root)) for d in sorted((root / "tests").iterdir()) if any(d.glob("test_*.py"))]
+    nodes = [str(f.relative_to(root)) for folder in COMPUTING for f in sorted((root / folder).glob(NODES))]
+    first = [folder for folder in FIRST if folder in folders]
+    rest = [folder for folder in folders if folder not in (*FIRST, *COMPUTING)]
+    return machine, ([*first, *(f"--ignore={file}" for file in machine)], [*rest, *nodes])
+
+
+def summed(closings: Sequence[str], seconds: float) -> str:
+    """One closing line in pytest's manner from several; a run without one is counted as an error."""
+    counts: Counter[str] = Counter()
+    for closing in closings:
+        found = COUNT.findall(closing)
+        counts.update({"errors": 1} if not found else {})
+        for number, what in found:
+            counts[{"error": "errors", "warning": "warnings"}.get(what, what)] += int(number)
+    order = ("failed", "passed", "skipped", "deselected", "xfailed", "xpassed", "warnings", "errors")
+    told = ", ".join(f"{counts[what]} {what}" for what in order if counts[what])
+    return f"=== {told} in {seconds:.2f}s ({int(seconds) // 60} min {int(seconds) % 60} s) ==="
+
+
+class Stream:
+    """A pytest that writes to a file from `of` on; `show` prints that, after which `code` and `closing` are there."""
+
+    def __init__(self, process: subprocess.Popen[bytes], file: Path) -> None:
+        self._process, self._file = process, file
+        self.closing = ""
+
+    @classmethod
+    @contextmanager
+    def of(cls, command: list[str], folder: Path, variables: Mapping[str, str], nice: int = 0) -> Iterator[Stream]:
+        """Start it; end it where whoever waits for it is interrupted."""
+        size = {"COLUMNS": str(shutil.get_terminal_size().columns)}
+        colour = ["--color=yes"] if sys.stdout.isatty() else []
+        with tempfile.NamedTemporaryFile(prefix="bench_test_") as sink:
+            process = subprocess.Popen(
+                [*command, *colour],
+                cwd=folder,
+                env={**variables, **size},
+                stdout=sink,
+                stderr=subprocess.STDOUT,
+                preexec_fn=lambda: _give_way(nice),
+            )
+            try:
+                yield cls(process, Path(sink.name))
+            except BaseException:
+                if not sys.stdout.isatty():
+                    process.send_signal(signal.SIGINT)  # on a terminal it got the Ctrl-C itself
+                raise
+            finally:
+                _wait(process)
+
+    @property
+    def code(self) -> int:
+        """Exit code; it has to have ended."""
+        return self._process.returncode
+
+    def show(self) -> str:
+        """Print what it has written and writes, until it ends; its last line."""
+        decoder = codecs.getincrementaldecoder("utf-8")("replace")
+        tail = ""
+        with self._file.open("rb") as source:
+            ended = False
+            while not ended:
+                ended = self._process.poll() is not None  # before reading: what it wrote last must not be missed
+                text = decoder.decode(source.read())
                 sys.stdout.write(text)
                 sys.stdout.flush()
                 tail = (tail + text)[-4096:]
-        except KeyboardInterrupt:
-            if not terminal:
-                process.send_signal(signal.SIGINT)  # on a terminal it got the Ctrl-C itself
-            _wait(process)
-            raise
-    lines = [line for line in tail.splitlines() if line.strip()]
-    return process.returncode, lines[-1] if lines else ""
+                if not ended and not text:
+                    time.sleep(POLL_S)
+        lines = [line for line in tail.splitlines() if line.strip()]
+        self.closing = lines[-1] if lines else ""
+        return self.closing
+
+
+def _give_way(nice: int) -> None:
+    os.nice(nice)
 
 
 def _wait(process: subprocess.Popen[bytes]) -> None:
@@ -107,3 +181,4 @@ def _wait(process: subprocess.Popen[bytes]) -> None:
         process.wait(INTERRUPT_S)
     except subprocess.TimeoutExpired:
         process.kill()
+        process.wait()
