@@ -17,7 +17,7 @@ import pytest
 
 PATIENCE_S = 60.0
 # Fast DDS drops an answer when it has not yet found the asking client after 100 ms, which a loaded machine exceeds.
-ASK_AGAIN_S = 8.0
+ASK_AGAIN_S = 3.0
 
 # Started with `nohup … &`, this process and with it all that it starts would ignore SIGINT, which tests send.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:

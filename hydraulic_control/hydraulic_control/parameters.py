@@ -44,7 +44,7 @@ LAW: tuple[ParameterSpec, ...] = (
     _live("integral_limit", 2.0, "largest contribution of the integral", "V", 0.0, DRIVE_LIMIT_V),
     _live("drive_limit", DRIVE_LIMIT_V, "largest drive", "V", 0.0, DRIVE_LIMIT_V),
     _live("slew_limit", 2000.0, "fastest change of the drive", "V/s", 1.0, 1e6),
-    _live("velocity_feedforward", 0.0, "drive per reference velocity", "V*s/m", 0.0, 1e3),
+    _live("velocity_feedforward", 0.0, "drive per reference velocity: 1/velocity gain of the plant", "V*s/m", 0.0, 1e3),
     _live("force_feedback", 0.0, "dynamic pressure feedback: drive per changing force", "V/N", 0.0, 1.0),
     _live("force_time", 2e-3, "time constant of its high pass", "s", 1e-4, 10.0),
     _live("deadband", 0.0, "half width of the dead band that is jumped", "V", 0.0, 2.0),

@@ -113,7 +113,7 @@ def test_limit_switches_close_at_the_stops(start: Any, client: Any, wait_until: 
     wait_until(lambda: extended and not extended[-1].data, "an open limit switch")
     client.source("hand", 5.0)
     wait_until(lambda: extended[-1].data, "the closed limit switch")
-    assert states[-1].position[0] > half - 2e-3
+    wait_until(lambda: states[-1].position[0] > half - 2e-3, "the piston at the stop")
     assert not any(message.data for message in retracted)
 
 

@@ -94,9 +94,11 @@ def test_the_topics_carry_what_the_pure_parts_make_of_the_states(bench: Bench, t
     assert np.sqrt(np.mean([m.position[0] ** 2 for m in heard["residual"]])) < 5e-4
 
     # The linear model: coefficients, poles and fit of one instant belong together.
-    last, poles, fit = (heard[name][-1] for name in ("model_parameters", "model_poles", "model_fit"))
+    poles, fit = heard["model_poles"][-1], heard["model_fit"][-1]
+    poles_at = {from_time(m.header.stamp): m for m in heard["model_poles"]}
+    last = next(m for m in heard["model_parameters"][::-1] if from_time(m.header.stamp) in poles_at)
     assert list(last.name) == ["a1", "a2", "b1", "b2", "c"]
-    same = next(m for m in heard["model_poles"][::-1] if m.header.stamp == last.header.stamp)
+    same = poles_at[from_time(last.header.stamp)]
     z = np.sort_complex(np.array(same.position) + 1j * np.array(same.velocity))
     np.testing.assert_allclose(z, np.sort_complex(np.roots([1.0, *last.position[:2]]).astype(complex)), atol=1e-9)
     assert len(poles.effort) == 2 and fit.effort[0] > 70.0

@@ -102,6 +102,8 @@ def test_a_plan_is_played_to_its_end(bench: Bench) -> None:
     assert finished["played"] >= 0.8 * finished["samples"]
     played = 0
     bench.wait_until(lambda: len(bench.commands) > finished["played"], "the last command")
+    last = from_time(bench.commands[-1].header.stamp)
+    bench.wait_until(lambda: from_time(bench.states[-1].header.stamp) > last, "the states that were answered")
     sampled = {from_time(state.header.stamp): state for state in bench.states}
     for command in bench.commands:
         stamp = from_time(command.header.stamp)
@@ -180,7 +182,7 @@ def test_a_run_that_goes_wrong_ends_at_zero_and_says_why(bench: Bench, provoke: 
     assert reason in aborted["reason"]
     assert [event["event"] for event in bench.events()] == ["started", "aborted"]
     assert aborted["played"] < aborted["samples"]
-    bench.wait_until(lambda: bench.commands[-1].effort[0] == 0.0, "a last command of 0 V")
+    bench.wait_until(lambda: bench.commands and bench.commands[-1].effort[0] == 0.0, "a last command of 0 V")
     assert "Traceback" not in node.output()
 
 

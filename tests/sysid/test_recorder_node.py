@@ -151,11 +151,14 @@ def test_it_stays_after_closing_and_tells_how_it_is(
     recorder = launch(NODE, *options(output=str(tmp_path / "bag"), max_duration=0.5))
     assert status_of("closed")["reason"] == "max_duration"
     assert recorder.popen.poll() is None
-    count = len(heard)
-    wait_until(lambda: len(heard) > count, "diagnostics after closing")
-    status = heard[-1].status[0]
+
+    def closed() -> list[Any]:
+        return [
+            s for m in heard for s in m.status if (s.name, s.message) == ("/actuator/recorder: recording", "closed")
+        ]
+
+    status = wait_until(closed, "diagnostics after closing")[-1]
     values = {entry.key: entry.value for entry in status.values}
-    assert (status.name, status.message) == ("/actuator/recorder: recording", "closed")
     assert values["queued"] == "0" and int(values["received_bytes"]) > 0
     recorder.interrupt(signal.SIGTERM)
     assert recorder.wait() == 0
