@@ -45,130 +45,144 @@ class Refit:
 
 def refit(anchor: Anchor, model: Model, start: Mapping[str, float], most_steps: int = MOST_STEPS) -> Refit:
     """Fit ``model``, which has the anchor's effects and more, from the anchor's values and ``start`` [SI, by key]."""
-    own = [k for k in start if model.entry(k).free]
-    keys = [*anchor.keys, *own]
-    values = {**anchor.values, **{k: float(v) for k, v in start.items()}}
-    scales = {**anchor.scales, **{k: scale(model, k) for k in own}}
-    bounds = [*anchor.bounds, *(model.entry(k).bounds for k in own)]
-    for key, bound in zip(keys, bounds, strict=True):
-        low, high = bound  # type: ignore[misc]
-        values[key] = min(max(values[key], low), high)
-    plant = Plant(model)
-    starts = [s.copy() for s in anchor.shooting.starts]
-    raw, values = _begin(anchor, plant, model, values, own, starts)
-    if raw is None:
-        return Refit(model, anchor.costs, *_sums(anchor, anchor.costs), tuple(own))
-    residual = [lin.project(r) for lin, r in zip(anchor.linear, raw, strict=True)]
-    cost = _sums(anchor, [np.sum(r**2, axis=1) for r in residual])[0]
+    fit = _Fit(anchor, model, start)
+    now = fit.begin(start)
+    if now is None:
+        return Refit(model, anchor.costs, *fit.sums(anchor.costs), tuple(fit.own))
     damping = 1e-3
     for _ in range(most_steps):
-        columns = _columns(anchor, plant, values, own, scales, starts, raw, model)
+        columns = fit.columns(now)
         if columns is None:
             break
-        beyond = project(anchor.linear, columns) if own else columns
-        every = [np.concatenate([a, b], axis=-1) for a, b in zip(anchor.beyond, beyond, strict=True)]
-        information = inner(anchor.split, every, every)
-        gradient = inner(anchor.split, every, [r[..., None] for r in residual])[:, 0]
-        used = {k: values[k] for k in keys}
-        moved = False
-        while damping <= _MOST_DAMPING:
-            change = bounded_step(information, gradient, used, scales, bounds, damping)
-            tried = {**values, **{k: used[k] + float(change[i]) * scales[k] for i, k in enumerate(keys)}}
-            there = []
-            for lin, s, r, a, b, p in zip(
-                anchor.linear, starts, raw, anchor.columns, columns, anchor.shooting.pieces, strict=True
-            ):
-                ahead = r + np.concatenate([a, b], axis=-1) @ change
-                new = s.copy()
-                new[:, p.free] += (lin.back @ ahead[..., None])[..., 0]
-                there.append(new)
-            again = _run(anchor, plant, tried, there)
-            if again is not None:
-                left = [lin.project(r) for lin, r in zip(anchor.linear, again, strict=True)]
-                lower = _sums(anchor, [np.sum(r**2, axis=1) for r in left])[0]
-                if lower < cost:
-                    moved = True
-                    break
-            damping *= 8.0
-        if not moved:
+        better, damping = fit.step(now, columns, damping)
+        if better is None:
             break
-        assert again is not None
-        gain = (cost - lower) / cost
-        values, starts, raw, residual, cost = tried, there, again, left, lower
-        damping = max(damping / 5.0, 1e-6)
+        gain = (now.cost - better.cost) / now.cost
+        now, damping = better, max(damping / 5.0, 1e-6)
         if gain < _FLAT:
             break
-    costs = _settled(anchor, plant, values, starts, raw)
-    done = model.with_values(within(model, values), source="fitted")
-    return Refit(done, costs, *_sums(anchor, costs), tuple(own))
+    costs = fit.settled(now)
+    done = model.with_values(within(model, now.values), source="fitted")
+    return Refit(done, costs, *fit.sums(costs), tuple(fit.own))
 
 
-def _begin(
-    anchor: Anchor, plant: Plant, model: Model, values: dict[str, float], own: list[str], starts: list[Array]
-) -> tuple[list[Array] | None, dict[str, float]]:
-    """Where to start: as far towards the prediction as lowers the sum of squares."""
-    nulls = {k: model.parameter(k).null for k in own}
-    for share in _SHARES:
-        tried = dict(values)
-        for key, null in nulls.items():
-            if null is not None:
-                tried[key] = between(null, values[key], share, model.parameter(key).default)
-        raw = _run(anchor, plant, tried, starts)
-        if raw is not None:
-            cost = _sums(
-                anchor, [np.sum(lin.project(r) ** 2, axis=1) for lin, r in zip(anchor.linear, raw, strict=True)]
-            )
-            if cost[0] < _sums(anchor, anchor.costs)[0] or share == _SHARES[-1]:
-                return raw, tried
-    return None, values
+@dataclass(frozen=True)
+class _Point:
+    """Values of all parameters by key, starts of the pieces (S, states), residuals (S, m) as they are (``raw``) and
+    without what other starts would explain, per record; and the sum of squares of the latter on fitted pieces."""
+
+    values: dict[str, float]
+    starts: list[Array]
+    raw: list[Array]
+    residual: list[Array]
+    cost: float
 
 
-def _settled(
-    anchor: Anchor, plant: Plant, values: Mapping[str, float], starts: list[Array], raw: list[Array]
-) -> list[Array]:
-    """Sums of squares of the pieces, each from the best of a few starts."""
-    costs = [np.sum(lin.project(r) ** 2, axis=1) for lin, r in zip(anchor.linear, raw, strict=True)]
-    for _ in range(_RESTS):
-        there = []
-        for lin, s, r, p in zip(anchor.linear, starts, raw, anchor.shooting.pieces, strict=True):
+class _Fit:
+    """One refit: the anchor, and what is beyond it (``own``: keys of the candidate's free parameters)."""
+
+    def __init__(self, anchor: Anchor, model: Model, start: Mapping[str, float]) -> None:
+        self.anchor, self.model, self.plant = anchor, model, Plant(model)
+        self.own = [k for k in start if model.entry(k).free]
+        self.keys = [*anchor.keys, *self.own]
+        self.scales = {**anchor.scales, **{k: scale(model, k) for k in self.own}}
+        self.bounds = [*anchor.bounds, *(model.entry(k).bounds for k in self.own)]
+
+    def sums(self, costs: list[Array]) -> tuple[float, float]:
+        """Of the fitted pieces, and of those held out."""
+        chosen = self.anchor.split.fitted
+        fitted = sum(float(c[f].sum()) for c, f in zip(costs, chosen, strict=True))
+        return fitted, sum(float(c[~f].sum()) for c, f in zip(costs, chosen, strict=True))
+
+    def begin(self, start: Mapping[str, float]) -> _Point | None:
+        """Where to start: as far towards the prediction as lowers the sum of squares."""
+        values = {**self.anchor.values, **{k: float(v) for k, v in start.items()}}
+        for key, bound in zip(self.keys, self.bounds, strict=True):
+            low, high = bound  # type: ignore[misc]
+            values[key] = min(max(values[key], low), high)
+        before = self.sums(self.anchor.costs)[0]
+        for share in _SHARES:
+            tried = dict(values)
+            for key in self.own:
+                parameter = self.model.parameter(key)
+                if parameter.null is not None:
+                    tried[key] = between(parameter.null, values[key], share, parameter.default)
+            there = self._at(tried, [s.copy() for s in self.anchor.shooting.starts])
+            if there is not None and (there.cost < before or share == _SHARES[-1]):
+                return there
+        return None
+
+    def columns(self, now: _Point) -> list[Array] | None:
+        """Change of the residuals (S, m, own) with each of the candidate's parameters over its scale, per record."""
+        found = []
+        for key in self.own:
+            high = self.model.entry(key).bounds[1]  # type: ignore[index]
+            step = _STEP * max(abs(now.values[key]), 0.1 * self.scales[key])
+            step = step if now.values[key] + step <= high else -step
+            moved = self._run({**now.values, key: now.values[key] + step}, now.starts)
+            if moved is None:
+                return None
+            found.append([(m - r) * (self.scales[key] / step) for m, r in zip(moved, now.raw, strict=True)])
+        return [
+            np.stack([c[i] for c in found], axis=-1) if found else np.zeros((*r.shape, 0))
+            for i, r in enumerate(now.raw)
+        ]
+
+    def step(self, now: _Point, columns: list[Array], damping: float) -> tuple[_Point | None, float]:
+        """A point with a smaller sum of squares and the damping it took; None where no damping gives one."""
+        anchor = self.anchor
+        beyond = project(anchor.linear, columns) if self.own else columns
+        every = [np.concatenate(pair, axis=-1) for pair in zip(anchor.beyond, beyond, strict=True)]
+        information = inner(anchor.split, every, every)
+        gradient = inner(anchor.split, every, [r[..., None] for r in now.residual])[:, 0]
+        used = {k: now.values[k] for k in self.keys}
+        while damping <= _MOST_DAMPING:
+            change = bounded_step(information, gradient, used, self.scales, self.bounds, damping)
+            moved = {k: used[k] + float(c) * self.scales[k] for k, c in zip(self.keys, change, strict=True)}
+            ahead = [
+                r + np.concatenate(pair, axis=-1) @ change
+                for r, *pair in zip(now.raw, anchor.columns, columns, strict=True)
+            ]
+            there = self._at({**now.values, **moved}, self._rested(now.starts, ahead))
+            if there is not None and there.cost < now.cost:
+                return there, damping
+            damping *= 8.0
+        return None, damping
+
+    def settled(self, now: _Point) -> list[Array]:
+        """Sums of squares (S,) of the pieces per record, each from the best of a few starts."""
+        costs = [np.sum(r**2, axis=1) for r in now.residual]
+        starts, raw = now.starts, now.raw
+        for _ in range(_RESTS):
+            there = self._at(now.values, self._rested(starts, raw))
+            if there is None:
+                break
+            left = [np.sum(r**2, axis=1) for r in there.residual]
+            better = [b < a for a, b in zip(costs, left, strict=True)]
+            costs = [np.where(c, b, a) for a, b, c in zip(costs, left, better, strict=True)]
+            starts = [np.where(c[:, None], n, s) for s, n, c in zip(starts, there.starts, better, strict=True)]
+            raw = [np.where(c[:, None], n, r) for r, n, c in zip(raw, there.raw, better, strict=True)]
+        return costs
+
+    def _rested(self, starts: list[Array], raw: list[Array]) -> list[Array]:
+        """Starts moved to where these residuals ask for, to first order."""
+        found = []
+        for lin, s, r, p in zip(self.anchor.linear, starts, raw, self.anchor.shooting.pieces, strict=True):
             new = s.copy()
             new[:, p.free] += (lin.back @ r[..., None])[..., 0]
-            there.append(new)
-        again = _run(anchor, plant, values, there)
-        if again is None:
-            break
-        left = [np.sum(lin.project(r) ** 2, axis=1) for lin, r in zip(anchor.linear, again, strict=True)]
-        better = [b < a for a, b in zip(costs, left, strict=True)]
-        costs = [np.where(c, b, a) for a, b, c in zip(costs, left, better, strict=True)]
-        starts = [np.where(c[:, None], n, s) for s, n, c in zip(starts, there, better, strict=True)]
-        raw = [np.where(c[:, None], n, r) for r, n, c in zip(raw, again, better, strict=True)]
-    return costs
+            found.append(new)
+        return found
 
-
-def _sums(anchor: Anchor, costs: list[Array]) -> tuple[float, float]:
-    fitted = sum(float(c[f].sum()) for c, f in zip(costs, anchor.split.fitted, strict=True))
-    held = sum(float(c[~f].sum()) for c, f in zip(costs, anchor.split.fitted, strict=True))
-    return fitted, held
-
-
-def _run(anchor: Anchor, plant: Plant, values: Mapping[str, float], starts: list[Array]) -> list[Array] | None:
-    try:
-        found = anchor.shooting.run(plant.with_parameters(dict(values)), starts)
-    except SimulationError:  # a step too far: the plant does not run there
-        return None
-    return found if all(np.isfinite(r).all() for r in found) else None
-
-
-def _columns(anchor, plant, values, own, scales, starts, raw, model) -> list[Array] | None:
-    found = []
-    for key in own:
-        high = model.entry(key).bounds[1]
-        step = _STEP * max(abs(values[key]), 0.1 * scales[key])
-        step = step if values[key] + step <= high else -step
-        moved = _run(anchor, plant, {**values, key: values[key] + step}, starts)
-        if moved is None:
+    def _at(self, values: dict[str, float], starts: list[Array]) -> _Point | None:
+        raw = self._run(values, starts)
+        if raw is None:
             return None
-        found.append([(m - r) * (scales[key] / step) for m, r in zip(moved, raw, strict=True)])
-    return [
-        np.stack([c[i] for c in found], axis=-1) if found else np.zeros((*raw[i].shape, 0)) for i in range(len(raw))
-    ]
+        residual = [lin.project(r) for lin, r in zip(self.anchor.linear, raw, strict=True)]
+        return _Point(values, starts, raw, residual, self.sums([np.sum(r**2, axis=1) for r in residual])[0])
+
+    def _run(self, values: Mapping[str, float], starts: list[Array]) -> list[Array] | None:
+        try:
+            found = self.anchor.shooting.run(self.plant.with_parameters(dict(values)), starts)
+        except SimulationError:  # a step too far: the plant does not run there
+            return None
+        return found if all(np.isfinite(r).all() for r in found) else None
