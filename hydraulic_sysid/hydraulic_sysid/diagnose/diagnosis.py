@@ -12,7 +12,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.calibrate.estimate import CalibrationError, Settings
 from hydraulic_sysid.calibrate.segments import SegmentError
-from hydraulic_sysid.locate import LocateError, locate
+from hydraulic_sysid.locate import LocateError, balance_figures, locate
 from hydraulic_sysid.records import Record
 
 from . import verdict
@@ -89,16 +89,25 @@ def diagnose(
     say("balances")
     base, final, added = found.base.model, found.final.model, bool(found.added)
     del found  # its sensitivities would take up the memory that the balances need
-    before, after = _balances(base, records), _balances(final, records) if added else None
-    add_balances(result, before, after, before if stand_in else after or before)
+    before, after = _balances(base, records), _balances(final, records) if added else []
+    blamed = _subsystems(base if stand_in else final, records) if kind == verdict.OUTSIDE else []
+    add_balances(result, before, after, blamed)
     return Diagnosis(diagnosed, tied, result)
 
 
-def _balances(model: Model, records: Sequence[Record]) -> dict[str, Any] | None:
+def _balances(model: Model, records: Sequence[Record]) -> list[dict[str, Any]]:
     try:
-        return locate(model, records, maps=False)
+        return balance_figures(model, records)
     except (LocateError, SimulationError):
-        return None
+        return []
+
+
+def _subsystems(model: Model, records: Sequence[Record]) -> list[str]:
+    """Subsystems by how much of the balances' residuals each explains, the most first."""
+    try:
+        return [str(s["name"]) for s in locate(model, records, maps=False)["subsystem"]]
+    except (LocateError, SimulationError):
+        return []
 
 
 def finished(found: Found, known: Mapping[str, Known], records: Sequence[Record], held_out: Sequence[Record]) -> Model:

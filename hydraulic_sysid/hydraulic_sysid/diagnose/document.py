@@ -212,14 +212,14 @@ def _subsystem(found: Found, kind: str, shapes: Sequence[Shape]) -> str | None:
 
 
 def add_balances(
-    result: dict[str, Any], before: dict[str, Any] | None, after: dict[str, Any] | None, blamed: dict[str, Any] | None
+    result: dict[str, Any], before: list[dict[str, Any]], after: list[dict[str, Any]], blamed: Sequence[str]
 ) -> None:
-    """Put the balances into a document. ``blamed``: those that say where something outside the library is, unless a
-    curve explains most of it."""
+    """Put balances into a document. ``blamed``: subsystems by what they explain of them, the most first; it says where
+    something outside the library is, unless a curve explains most of that."""
     result["balances"] = _balances(before, after)
     curve = result["shapes"][0]["share"] if result["shapes"] else 0.0
-    if result["verdict"]["kind"] == verdict.OUTSIDE and curve <= _TELLING and blamed and blamed.get("subsystem"):
-        result["verdict"]["subsystem"] = str(blamed["subsystem"][0]["name"])
+    if result["verdict"]["kind"] == verdict.OUTSIDE and curve <= _TELLING and blamed:
+        result["verdict"]["subsystem"] = blamed[0]
 
 
 def _shape(s: Shape) -> dict[str, Any]:
@@ -237,11 +237,7 @@ def _shape(s: Shape) -> dict[str, Any]:
     }
 
 
-def _balances(before: dict[str, Any] | None, after: dict[str, Any] | None) -> list[dict[str, Any]]:
-    rows = []
-    later = {b["name"]: b for b in (after or {}).get("balances", ())}
-    for b in (before or {}).get("balances", ()):
-        row = {k: b[k] for k in ("name", "subsystem", "unit", "residual_rms", "noise", "ratio") if k in b}
-        row["ratio_after"] = later[b["name"]]["ratio"] if b["name"] in later else None
-        rows.append(row)
-    return rows
+def _balances(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    later = {b["name"]: b["ratio"] for b in after}
+    keys = ("name", "subsystem", "unit", "residual_rms", "noise", "ratio")
+    return [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]

@@ -5,6 +5,6 @@ to them, `blame` how much of what is left each subsystem explains, `document` ga
 """
 
 from .balances import LocateError
-from .document import locate
+from .document import balance_figures, locate
 
-__all__ = ["LocateError", "locate"]
+__all__ = ["LocateError", "balance_figures", "locate"]

@@ -29,6 +29,21 @@ _SHORTEST = 2.0  # s of a record
 LEAST_MOVE = 1e-6  # of its size, that a parameter at its bound may move
 
 
+def balance_figures(model: Model, records: Sequence[Record]) -> list[dict[str, Any]]:
+    """The balances of all records together, their residuals and noise (as in `locate`), and nobody is blamed.
+
+    :raises LocateError: as `locate`.
+    :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
+    """
+    names = _names(model, records)
+    if not names:
+        return []
+    balances = Balances(model, spool_measured="spool" in names)
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        studies = list(pool.map(lambda i: study(balances, records[i], names, (), seed=i), range(len(records))))
+    return figures.balances(studies, names, False)
+
+
 def locate(
     model: Model, records: Sequence[Record], progress: Callable[[str], None] | None = None, maps: bool = True
 ) -> dict[str, Any]:
