@@ -14,7 +14,7 @@ from dataclasses import dataclass
 class Slot:
     """One stage. ``kind``: "law" (one effect at a time, with an ideal default), "chain" (each effect takes the
     stage's signal and returns it changed) or "sum" (contributions add). ``returns`` names what a kernel returns;
-    ``signal`` is a chain's or a law's own signal. ``subsystem`` is the balance that shows the effect. ``hydraulic``
+    ``signal`` is a chain's or a law's own signal. ``subsystem`` is the part of the bench it belongs to. ``hydraulic``
     marks a stage that a mechanical plant does not have."""
 
     name: str
@@ -44,7 +44,7 @@ SLOTS: dict[str, Slot] = {
         Slot("tank", "law", ("pressure_tank",), "supply", "return pressure; ideal: constant", hydraulic=True),
         Slot("flow", "sum", ("flow_a", "flow_b"), "flow", "flow into chamber A and into chamber B besides the lands",
              hydraulic=True),
-        Slot("compliance", "sum", ("compliance_a", "compliance_b"), "flow",
+        Slot("compliance", "sum", ("compliance_a", "compliance_b"), "fluid",
              "capacity [m³/Pa] of the chambers beside that of the plain oil", hydraulic=True),
         Slot("bristle", "law", ("bristle_length", "bristle_time"), "force",
              "how the direction of dry friction follows the motion; ideal: within microns"),

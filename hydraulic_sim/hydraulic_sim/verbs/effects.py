@@ -68,7 +68,7 @@ def _whole(record: dict) -> None:
     console.print(f"[bold]{record['name']}[/bold]: {record['summary']}")
     for label, key in (
         ("acts in", "slot"),
-        ("shows in the balance of", "subsystem"),
+        ("acts on", "subsystem"),
         ("equation", "equation"),
         ("source", "source"),
         ("excited by", "excited_by"),
