@@ -28,6 +28,12 @@ class Response:
         """Plain lists, for JSON."""
         return {name: value.tolist() for name, value in asdict(self).items()}
 
+    def gaps(self) -> tuple[float, float]:
+        """Part of the samples that is missing from a steady rate, and the longest time without one [s]."""
+        steps = np.diff(self.time)
+        whole = (self.time[-1] - self.time[0]) / float(np.median(steps))
+        return max(1.0 - len(steps) / whole, 0.0), float(steps.max())
+
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Response:
         """The response in such a document. Raises `HydraulicControlError` where a column is missing or too short."""

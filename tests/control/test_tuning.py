@@ -225,6 +225,17 @@ def test_tune_writes_a_file_that_evaluate_and_the_node_read(
     assert {row["where"] for row in document["rows"]} == {"identified chirp", "nonlinear", "bench"}
 
 
+def test_a_response_with_gaps_is_judged_with_a_word_on_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    time = np.delete(1e-3 * np.arange(2000), np.s_[1000:1100])
+    columns = {"time": time, "reference": 0.05 * (time > 0.5), "position": 0.05 * (time > 0.55), "drive": 0.0 * time}
+    bench = tmp_path / "bench.json"
+    bench.write_text(json.dumps({"kind": "step", **{k: v.tolist() for k, v in columns.items()}}))
+    assert evaluate.main(["--bench", str(bench), "--json"]) == 0
+    shown = capsys.readouterr()
+    assert "bench.json: 5% of the states were not heard, for up to 101 ms" in shown.err
+    assert json.loads(shown.out)["npid"]["rows"]
+
+
 @pytest.mark.parametrize(
     ("verb", "arguments", "complaint"),
     [

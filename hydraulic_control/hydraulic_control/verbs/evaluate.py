@@ -30,6 +30,7 @@ examples:
   python -m hydraulic_control evaluate --gains npid pid --scatter 24
   python -m hydraulic_control evaluate --gains npid --identified runs/chirp/linear_model.json
 """
+_TOLD = 0.01  # part of a response that may be missing without a word
 SEED = 2026  # of the plants that gains are judged on: not those of tuning
 
 
@@ -87,7 +88,14 @@ def _bench(path: Path) -> tuple[str, Response]:
     kind = document.get("kind") if isinstance(document, dict) else None
     if kind not in KINDS:
         raise HydraulicControlError(f"{path}: kind is {kind!r}; allowed are {', '.join(KINDS)}")
-    return kind, Response.from_document(document)
+    response = Response.from_document(document)
+    lost, longest = response.gaps()
+    if lost > _TOLD:
+        text = (
+            f"{path}: {lost:.0%} of the states were not heard, for up to {1e3 * longest:.0f} ms: its figures are those"
+        )
+        print(f"{text} of a machine that did not keep up", file=sys.stderr)
+    return kind, response
 
 
 def _print_steps(console: Console, name: str, result: dict[str, Any], step: float) -> None:
@@ -101,8 +109,8 @@ def _print_steps(console: Console, name: str, result: dict[str, Any], step: floa
     console.print(table)
     for agreement in result["agreement"]:
         printed = paper.beside(agreement["identified"])
-        word = "within" if agreement["alike"] else "not within"
-        text = f"identified {agreement['identified']} and nonlinear plant agree {word} 15 % on each figure"
+        word = "agree" if agreement["alike"] else "do not agree"
+        text = f"identified {agreement['identified']} and nonlinear plant {word} within 15 % on each figure"
         if printed:
             better = evaluation.better_than_paper(result, agreement["identified"])
             word = "better than" if better else "not better than"
