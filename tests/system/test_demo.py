@@ -23,9 +23,9 @@ pytest.importorskip("rclpy")
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
 MARK = "HYDRAULIC_BENCH_TEST_RUN"
-PATIENCE_S = 110.0
+PATIENCE_S = 400.0  # a run takes most of a minute; on a machine that is busy besides, many times that
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(PATIENCE_S + 60.0)
 
 
 @dataclass
