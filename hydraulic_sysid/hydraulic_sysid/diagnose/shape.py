@@ -102,7 +102,8 @@ def _seen(anchor: Anchor) -> dict[str, Array]:
     if model.kind == "hydraulic" and all({"pressure_a", "pressure_b"} <= set(p.channels) for p in pieces):
         a = np.concatenate([p.seen[:, 2] for p in pieces])
         b = np.concatenate([p.seen[:, 3] for p in pieces])
-        values |= {"load_pressure": a - b, "size_of_load_pressure": np.abs(a - b), "mean_pressure": 0.5 * (a + b)}
+        values |= {"pressure_a": a, "pressure_b": b, "mean_pressure": 0.5 * (a + b)}
+        values |= {"load_pressure": a - b, "size_of_load_pressure": np.abs(a - b)}
     return values
 
 
