@@ -199,7 +199,7 @@ class Bench:
         """Send drive and SYNC; whether all frames came, and the frame that was sent."""
         with self._changed:
             problem = self.faults.text
-            if problem:
+            if problem and not self.machine.problem:
                 self.machine.fail(problem)
             setpoint = self.measuring.allowed(drive) if self.machine.active else 0.0
             frame, _ = self._codec.encode({"control_word": self.machine.control, "drive": setpoint})
@@ -232,7 +232,7 @@ class Bench:
         end = due = time.monotonic()
         end += patience
         while not done() and due < end:
-            complete, frame = self._exchange(0.0, time.time_ns())
+            complete, frame = self._exchange(0.0, self.beat.next_sync())
             with self._changed:
                 self._hear_valve()
                 if complete:

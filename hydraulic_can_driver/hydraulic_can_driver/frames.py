@@ -37,7 +37,8 @@ class Frames:
         self._lacked = self._missing
         self._open = False
         self.cycle = 0
-        self.sync_ns = 0
+        self.sync_ns = 0  # wall time
+        self.instant_ns = 0  # the same instant on the monotonic clock
         self.late = 0
         self.owed: dict[int, int] = {}
         self.behind = 0
@@ -55,6 +56,7 @@ class Frames:
             self._open = True
             self.cycle += 1
             self.sync_ns = stamp_ns
+            self.instant_ns = stamp_ns - time.time_ns() + time.monotonic_ns()
             self._changed.notify_all()
 
     def end(self) -> None:
@@ -111,10 +113,11 @@ class Frames:
         if left > 0:
             self.owed[cob_id] = left
 
-    def wait_sync(self, cycle: int, until: float) -> bool:
-        """Wait until a SYNC beyond number `cycle` has begun, at the longest until `until` of `time.monotonic`."""
+    def wait_sync(self, after_ns: int, until_ns: int) -> bool:
+        """Wait for a SYNC later than `after_ns`, at the longest until `until_ns`; both of `time.monotonic_ns`."""
         with self._changed:
-            return self._changed.wait_for(lambda: self.cycle > cycle, max(until - time.monotonic(), 0.0))
+            rest = max(until_ns - time.monotonic_ns(), 0) * 1e-9
+            return self._changed.wait_for(lambda: self.instant_ns > after_ns, rest)
 
     def wait(self, until: float) -> bool:
         """Whether all frames of the cycle are there; waits for them at the longest until `until`."""

@@ -26,6 +26,9 @@ _EMERGENCY = struct.Struct("<HB5s")
 _BUS_OFF = 0x40
 # After this time the echo of a frame is taken to be lost, and excuses no stranger any more.
 _ECHO_S = 1.0
+# The kernel sends at most one SYNC per period, if some of them late. So many more than time has passed for are another
+# master's; what there is too much is forgotten at so much per SYNC, since clocks differ.
+_SURPLUS, _FORGOTTEN = 2.5, 0.01
 
 
 class Receiver(can.Listener):
@@ -60,6 +63,7 @@ class Receiver(can.Listener):
             self._handlers[own] = lambda data, own=own: self._own(own)  # type: ignore[misc]
         self._kernel_sync = kernel_sync
         self._sync_period_ns = round(1e9 / bus.rate)
+        self._surplus = 0.0
 
     def on_message_received(self, msg: can.Message) -> None:
         """Sort a frame."""
@@ -104,10 +108,12 @@ class Receiver(can.Listener):
             self._faults.report(Fault.SECOND_MASTER, f"a second master on the bus: COB-ID 0x{cob_id:03X} is not ours")
 
     def _kernel(self, stamp_ns: int) -> None:
-        if self.watching and 0 < stamp_ns - self.frames.sync_ns < self._sync_period_ns // 3:
+        passed = (stamp_ns - self.frames.sync_ns) / self._sync_period_ns
+        self.frames.begin(stamp_ns)
+        self._surplus = max(self._surplus + 1.0 - passed - _FORGOTTEN, 0.0) if self.watching and passed > 0.0 else 0.0
+        if self._surplus > _SURPLUS:
+            self._surplus = 0.0
             self._own(SYNC)
-        else:
-            self.frames.begin(stamp_ns)
 
     def _heartbeat(self, node: Node, data: bytes) -> None:
         if len(data) != 1:

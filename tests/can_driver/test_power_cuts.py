@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import can
 import pytest
+from can_driver.rigs import Rig, patient_bus, rig_on
 
 from hydraulic_can_driver import master
 from hydraulic_can_driver.cia408 import State
@@ -35,18 +40,24 @@ STEPS = {
     "init": ("state", "valve", "init", 1),
     "pre-operational": ("nmt", "valve", "PRE-OPERATIONAL", 2),
 }
+LEFT = ("init", "disabled", "not ready", "fault init", "fault disabled")
+RATE, AT_ONCE = 100.0, 6
+LOST_AFTER_S, PATIENCE_S = 0.6, 60.0
 
 
-@pytest.fixture(autouse=True)
-def less_patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most of these tests end with questions that nobody answers."""
-    monkeypatch.setattr(master, "_ANSWER_S", 0.6)
+@contextmanager
+def running(lost_after: float, **monitoring: Any) -> Iterator[Rig]:
+    here = rig_on(replace(patient_bus(), rate=RATE), lost_after, **monitoring)
+    try:
+        yield here
+    finally:
+        here.close()
 
 
 class Life(threading.Thread):
     """A bench from boot to stop, with 2 V in between; errors of the driver end it, after an attempt to stop."""
 
-    def __init__(self, here: Any) -> None:
+    def __init__(self, here: Rig) -> None:
         super().__init__(daemon=True)
         self.here = here
         self.problem = ""
@@ -76,12 +87,19 @@ class Life(threading.Thread):
         self.problem = here.bench.problem
 
 
-def happened(here: Any, wait_until: Any, life: Life, event: threading.Event) -> None:
-    wait_until(lambda: event.is_set() or not life.is_alive(), "the step", 60.0)
+def wait_until(condition: Callable[[], Any], what: str) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end, f"waited {PATIENCE_S:g} s in vain for {what}"
+        time.sleep(0.005)
+
+
+def happened(life: Life, event: threading.Event) -> None:
+    wait_until(lambda: event.is_set() or not life.is_alive(), "the step")
     assert event.is_set(), f"the step did not come: {life.problem}"
 
 
-def ends_at_zero(here: Any, wait_until: Any) -> None:
+def ends_at_zero(here: Rig) -> None:
     wait_until(lambda: here.devices.drive == 0.0, "0 V at the spool")
     end = time.monotonic() + 0.2
     while time.monotonic() < end:
@@ -89,61 +107,75 @@ def ends_at_zero(here: Any, wait_until: Any) -> None:
         time.sleep(0.005)
 
 
-CUTS = [("valve", step) for step in STEPS]
-CUTS += [("lvdt", step) for step in ("other devices", "operational", "first SYNC", "active", "driving", "disabling")]
-
-
-@pytest.mark.parametrize(("node", "step"), CUTS)
-def test_power_of_a_device(node: str, step: str, rig: Callable[..., Any], wait_until: Any) -> None:
+def cut_device(node: str, step: str) -> None:
+    """The power of a device fails at a step, and comes back when the driver has ended."""
     kind, name, detail, count = STEPS[step]
-    here = rig(missed_cycles=20, state_change=1.0)
-    cut, event = upset.PowerCut(node), threading.Event()
-    here.devices.at(kind, name, detail, cut, count)
-    here.devices.listeners.append(
-        lambda e: event.set() if (e.kind, e.node, e.detail) == ("power", node, "off") else None
-    )
-    life = Life(here)
-    life.start()
-    happened(here, wait_until, life, event)
-    life.join(60.0)
-    assert not life.is_alive()
-    ends_at_zero(here, wait_until)
-    if step not in ("init", "pre-operational") and not (node == "lvdt" and step == "disabling"):
-        assert node in life.problem, "the diagnostic names the device"
-    here.devices.clear(cut)
-    ends_at_zero(here, wait_until)
-    assert here.devices.valve.machine.state.label in ("init", "disabled", "not ready", "fault init", "fault disabled")
+    with running(LOST_AFTER_S * 20.0, missed_cycles=20, state_change=1.0) as here:
+        cut, event = upset.PowerCut(node), threading.Event()
+        here.devices.at(kind, name, detail, cut, count)
+        here.devices.listeners.append(
+            lambda e: event.set() if (e.kind, e.node, e.detail) == ("power", node, "off") else None
+        )
+        life = Life(here)
+        life.start()
+        happened(life, event)
+        life.join(PATIENCE_S)
+        assert not life.is_alive()
+        ends_at_zero(here)
+        if step not in ("init", "pre-operational") and not (node == "lvdt" and step == "disabling"):
+            assert node in life.problem, "the diagnostic names the device"
+        here.devices.clear(cut)
+        ends_at_zero(here)
+        assert here.devices.valve.machine.state.label in LEFT
 
 
-@pytest.mark.parametrize("step", STEPS)
-def test_power_of_the_driver(
-    step: str, rig: Callable[..., Any], wait_until: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def cut_driver(step: str) -> None:
     """From the step on not one more frame of the driver reaches the bus: as if its plug had been pulled."""
     kind, name, detail, count = STEPS[step]
-    here = rig(lost_after=0.3, state_change=1.0)
-    event = threading.Event()
-    seen = [0]
+    with running(LOST_AFTER_S, state_change=1.0) as here:
+        event = threading.Event()
+        seen = [0]
 
-    def pull(happening: Any) -> None:
-        if (happening.kind, happening.node, happening.detail) == (kind, name, detail):
-            seen[0] += 1
-            if seen[0] == count:
-                event.set()
+        def pull(happening: Any) -> None:
+            if (happening.kind, happening.node, happening.detail) == (kind, name, detail):
+                seen[0] += 1
+                if seen[0] == count:
+                    event.set()
 
-    send = here.bench.master.can.send
+        send = here.bench.master.can.send
 
-    def plugged(message: can.Message, timeout: float | None = None) -> None:
-        if not event.is_set():
-            send(message, timeout)
+        def plugged(message: can.Message, timeout: float | None = None) -> None:
+            if not event.is_set():
+                send(message, timeout)
 
-    monkeypatch.setattr(here.bench.master.can, "send", plugged)
-    here.devices.listeners.append(pull)
-    life = Life(here)
-    life.start()
-    happened(here, wait_until, life, event)
-    ends_at_zero(here, wait_until)
-    wait_until(lambda: here.devices.valve.machine.state.label != "active", "a valve that has given up")
-    here.loop and setattr(here.loop, "ending", True)
-    life.join(60.0)
-    ends_at_zero(here, wait_until)
+        here.bench.master.can.send = plugged  # type: ignore[method-assign]
+        here.devices.listeners.append(pull)
+        life = Life(here)
+        life.start()
+        happened(life, event)
+        ends_at_zero(here)
+        wait_until(lambda: here.devices.valve.machine.state.label != "active", "a valve that has given up")
+        if here.loop is not None:
+            here.loop.ending = True
+        life.join(PATIENCE_S)
+        ends_at_zero(here)
+
+
+CUTS = [("valve", step) for step in STEPS]
+CUTS += [("lvdt", step) for step in ("other devices", "operational", "first SYNC", "active", "driving", "disabling")]
+CASES: dict[tuple[str, str], Callable[[], None]] = {cut: partial(cut_device, *cut) for cut in CUTS}
+CASES |= {("driver", step): partial(cut_driver, step) for step in STEPS}
+
+
+@pytest.fixture(scope="module")
+def outcomes() -> Iterator[dict[tuple[str, str], Future[None]]]:
+    """All cases, several at once: mostly they wait for answers that do not come."""
+    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(AT_ONCE) as pool:
+        patch.setattr(master, "_ANSWER_S", 0.6)
+        yield {case: pool.submit(run) for case, run in CASES.items()}
+        pool.shutdown(cancel_futures=True)
+
+
+@pytest.mark.parametrize("case", CASES, ids="-".join)
+def test_the_drive_ends_at_zero(case: tuple[str, str], outcomes: dict[tuple[str, str], Future[None]]) -> None:
+    outcomes[case].result()

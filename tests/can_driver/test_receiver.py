@@ -107,3 +107,26 @@ def test_a_receiving_thread_that_fails() -> None:
     one, faults = listening("socketcan")
     one.on_error(OSError(100, "Network is down"))
     assert "Network is down" in faults.text
+
+
+PERIOD = 1.0 / load_bus("bench").rate
+
+
+def hear_kernel(one: Receiver, *syncs: float) -> None:
+    """SYNCs of the kernel, in periods."""
+    for instant in syncs:
+        one.on_message_received(
+            can.Message(arbitration_id=0x80, is_extended_id=False, timestamp=100 + instant * PERIOD)
+        )
+
+
+def test_syncs_of_the_kernel_may_be_late_but_not_too_many() -> None:
+    bus, faults = load_bus("bench"), FaultLatch()
+    faults.armed = True
+    one = Receiver(bus, Frames(bus, faults), faults, "socketcan", kernel_sync=True)
+    one.watching = True
+    hear_kernel(one, *(n + (0.9 if n % 3 == 0 else 0.0) for n in range(300)))
+    hear_kernel(one, *(300.0 + 0.999 * n for n in range(1000)))
+    assert not faults.text and one.frames.cycle == 1300
+    hear_kernel(one, 1400.0, 1400.5, 1401.0, 1401.5, 1402.0, 1402.5, 1403.0)
+    assert Fault.SECOND_MASTER in faults and "0x080" in faults.text

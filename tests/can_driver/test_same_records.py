@@ -97,6 +97,7 @@ def over_can(patient: Bus) -> Iterator[Record]:
         return sample
 
     yield record("can", step)
+    bench._period = 1.0 / RATE  # it stops by cycles of its own
     bench.close()
     devices.stop()
     line.shutdown()
