@@ -27,6 +27,7 @@ import hydraulic_sysid.nodes.recorder
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_can_driver.nodes import can_driver
 from hydraulic_can_driver.virtual import Reading, VirtualBench
+from hydraulic_interfaces.nodes.log_callers import know_log_callers
 from hydraulic_interfaces.pacing import request_realtime
 
 # What the virtual hydraulics do; the identification has to find it.
@@ -162,6 +163,7 @@ def listened_to(channel: str) -> bool:
 def main() -> int:
     channel, folder = sys.argv[1], Path(sys.argv[2])
     begun = time.monotonic()
+    know_log_callers()  # half a minute here; forked, the others know it
     with (folder / "candump.log").open("wb") as sink:
         # -L: log format, with the kernel's time of reception to the microsecond.
         witness = subprocess.Popen(["candump", "-L", channel], stdout=sink)
