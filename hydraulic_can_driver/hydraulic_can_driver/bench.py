@@ -60,6 +60,7 @@ class Bench:
         self._changed = threading.Condition()
         self._looping = False
         self._next_heartbeat = 0.0
+        self._left_by = 0.0  # until then the valve may take to get ready; inf: its fault has been reset
         self.master = Master(bus, self.receiver, interface, channel)
         beat = KernelBeat if kernel else LoopBeat
         self.beat: Beat = beat(self.master, self.frames, round(1e9 * self._period))
@@ -79,16 +80,15 @@ class Bench:
         self.readings = {node.name: self.master.readings(node) for node in self.bus.nodes.values()}
 
     def inspect(self) -> None:
-        """Check who is there and read back what they are set to; nothing is written.
-
-        :raises DeviceError: a device does not answer, or is another one.
-        """
+        """Check who is there and read back what they are set to; nothing is written. Raises as `boot`."""
         for node in self.bus.nodes.values():
             self.master.identify(node)
         self.readings = {node.name: self.master.readings(node) for node in self.bus.nodes.values()}
 
     def start(self) -> None:
         """All devices operational, all frames there, the valve DISABLED at 0 V.
+
+        A fault that was left behind in the valve, as by a driver that was killed, is reset once, and logged.
 
         :raises DeviceError: it does not come to that; the text says why.
         """
@@ -99,6 +99,7 @@ class Bench:
         self.measuring.forget()
         self.frames.forget()
         self._looping, self.operational = False, True
+        self._left_by = time.monotonic() + self.bus.monitoring.state_change
         self.beat.start()
         for node in self.bus.nodes.values():
             self.master.command(node, START)
@@ -243,10 +244,19 @@ class Bench:
     def _ready(self) -> bool:
         if self.machine.arrived and self.machine.goal is State.INIT:
             self.machine.ask(State.DISABLED, time.monotonic())
+        self._reset_what_was_left()
         states = self.receiver.states
         operational = all(states.get(node.name) == OPERATIONAL for node in self.bus.nodes.values() if node.heartbeat)
         answered = operational and not self.frames.lacking()
         return answered and self.machine.arrived and self.machine.goal is State.DISABLED
+
+    def _reset_what_was_left(self) -> None:
+        """NOT_READY is as well what a fault in INIT looks like."""
+        now, state = time.monotonic(), self.machine.state
+        if self._left_by < float("inf") and (state.faulty or state is State.NOT_READY and now > self._left_by):
+            self._left_by = float("inf")
+            self.faults.report(Fault.VALVE, f"reset at the start: {describe(self.machine.status or 0)}")
+            self.machine.reset(now)
 
     def _reason(self) -> str:
         states, nodes = self.receiver.states, self.bus.nodes.values()
@@ -273,9 +283,8 @@ class Bench:
 
     def _quieten(self) -> None:
         """Setpoint 0 and control word 0 by SDO: the valve may have been left, or have started, active."""
-        valve = self.bus.valve
         for signal in reversed(self.bus.drive_pdo.signals):
-            self.master.write(valve, signal.address, 0)
+            self.master.write(self.bus.valve, signal.address, 0)
 
     def _dismiss(self) -> None:
         """Everybody pre-operational, the valve at 0 once more; then nobody watches the driver any more."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
+from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.cia408 import State
 from hydraulic_can_driver.errors import DeviceError
 from hydraulic_can_driver.faults import Fault
@@ -73,6 +75,8 @@ def test_fault(name: str, rig: Callable[..., Any], wait_until: Any) -> None:
         with pytest.raises(DeviceError):
             here.bench.reset()
     assert here.devices.drive == 0.0 and {sample.drive for sample in loop.samples[latched:]} <= {0.0}
+    if name == "connector out":
+        wait_until(lambda: here.devices.valve.machine.state.label == "disabled", "a valve that is disabled")
     here.devices.clear(case.upset)
     loop.drive = 0.0
     if case.after == "reset":
@@ -86,6 +90,74 @@ def test_fault(name: str, rig: Callable[..., Any], wait_until: Any) -> None:
     assert here.bench.problem == "" and here.devices.drive == 0.0
     here.enable(1.0)
     wait_until(lambda: here.devices.drive == pytest.approx(1.0, abs=1e-3), "1 V at the spool after the reset")
+
+
+@pytest.mark.parametrize("left", ["active", "disabled", "init"])
+def test_a_driver_that_was_killed_leaves_a_valve_that_another_one_gets_going(
+    left: str, rig: Callable[..., Any], wait_until: Any
+) -> None:
+    here = rig(lost_after=0.5)
+    here.run()
+    if left == "active":
+        here.enable(2.0)
+        wait_until(lambda: here.devices.drive == pytest.approx(2.0, abs=1e-3), "2 V at the spool")
+    valve = here.devices.valve
+    kill(here, control=0 if left == "init" else None)
+    wait_until(lambda: "fault" in valve.machine.state.label and here.devices.drive == 0.0, "a valve that gives up")
+    assert (valve.machine.state.label == "fault init") == (left == "init")
+    drives: list[float] = []
+    here.devices.listeners.append(lambda event: drives.append(here.devices.drive))
+    here.bench = Bench(here.bus)
+    here.run()
+    assert valve.machine.state.label == "disabled" and not here.bench.problem
+    assert "reset at the start" in " ".join(here.bench.faults.log)
+    assert set(drives) == {0.0}
+    here.enable(1.0)
+    wait_until(lambda: here.devices.drive == pytest.approx(1.0, abs=1e-3), "1 V at the spool")
+
+
+def kill(here: Any, control: int | None) -> None:
+    """Nothing more from the driver, from one moment to the next; before it `control` as the last control word."""
+    here.loop.ending = True
+    here.loop.join()
+    here.loop = None
+    if control is not None:
+        here.bench.machine.fail("test")
+        here.bench.machine.control = control
+        here.bench.cycle(time.time_ns(), 0.0)
+        here.bench.cycle(time.time_ns(), 0.0)
+    here.bench.master.close()
+
+
+def test_the_connector_of_the_valve(rig: Callable[..., Any], wait_until: Any) -> None:
+    """Nobody can tell it to stop: it does so by itself, and stays so when it is plugged in again."""
+    here = rig(lost_after=0.5, missed_cycles=20)
+    here.run()
+    here.enable(2.0)
+    wait_until(lambda: here.devices.drive == pytest.approx(2.0, abs=1e-3), "2 V at the spool")
+    out, valve = upset.Unplugged("valve"), here.devices.valve
+    here.devices.inject(out)
+    wait_until(lambda: here.devices.drive == 0.0 and valve.machine.faulty, "a valve that gives up")
+    wait_until(lambda: "valve" in here.bench.problem, "the diagnostic")
+    here.devices.clear(out)
+    wait_until(lambda: valve.machine.state.label == "fault disabled", "a valve that is disabled")
+    assert here.devices.drive == 0.0
+    here.again(boot=False)
+    assert valve.machine.state.label == "disabled" and here.devices.drive == 0.0
+
+
+def test_a_fault_that_lasts_is_told_by_the_start(rig: Callable[..., Any], wait_until: Any) -> None:
+    here = rig(state_change=0.5)
+    upset_valve = upset.StatusFault("valve")
+    here.devices.inject(upset_valve)
+    here.bench.boot()
+    with pytest.raises(DeviceError, match="FAULT|NOT_READY"):
+        here.bench.start()
+    assert here.devices.drive == 0.0
+    here.devices.clear(upset_valve)
+    here.run()
+    here.enable(1.0)
+    wait_until(lambda: here.devices.drive == pytest.approx(1.0, abs=1e-3), "1 V at the spool")
 
 
 def accepted(bench: Any) -> bool:
