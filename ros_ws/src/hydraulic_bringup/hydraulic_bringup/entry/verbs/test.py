@@ -17,7 +17,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..bench import Bench
@@ -51,8 +51,8 @@ def run(bench: Bench, arguments: list[str]) -> int:
     pytest = [python, "-m", "pytest"]
     if arguments or not all((root / folder).is_dir() for folder in COMPUTING):
         here = Path.cwd() if root in Path.cwd().parents else root  # so that given paths mean what they say
-        print("== pytest", flush=True)
-        with Stream.of([*pytest, *arguments], here, variables) as only:
+        only = Stream([*pytest, *arguments], here, variables)
+        with ending([only]):
             closing = only.show()
         code = only.code
     else:
@@ -70,22 +70,19 @@ def _all(pytest: list[str], root: Path, variables: Mapping[str, str]) -> tuple[i
     computing = [*COMPUTING, f"--ignore-glob={NODES}"]
     streams: list[Stream] = []
 
-    def shown(selection: Sequence[str], stream: Stream) -> None:
-        print(f"== pytest {' '.join(selection)}", flush=True)
-        stream.show()
-        streams.append(stream)
+    def start(selection: Sequence[str], nice: int = 0) -> None:
+        command = [*pytest, *selection, "-p", "no:cacheprovider"]
+        streams.append(Stream(command, root, variables, " ".join(selection), nice))
 
-    def start(selection: Sequence[str], nice: int = 0) -> AbstractContextManager[Stream]:
-        return Stream.of([*pytest, *selection, "-p", "no:cacheprovider"], root, variables, nice)
-
-    with start(computing, NICE) as beside:
+    with ending(streams):
+        start(computing, NICE)
         if machine:
-            with start(machine) as alone:
-                shown(machine, alone)
-        with start(halves[0]) as first, start(halves[1]) as second:
-            shown(halves[0], first)
-            shown(halves[1], second)
-        shown(computing, beside)
+            start(machine)
+            streams[-1].show()
+        for half in halves:
+            start(half)
+        for stream in (*streams[-len(halves) :], streams[0]):
+            stream.show()
     closing = summed([stream.closing for stream in streams], time.monotonic() - begun)
     bad = [stream for stream in streams if stream.code]
     if bad:
@@ -118,35 +115,24 @@ def summed(closings: Sequence[str], seconds: float) -> str:
 
 
 class Stream:
-    """A pytest that writes to a file from `of` on; `show` prints that, after which `code` and `closing` are there."""
+    """A pytest that has been started and writes to a file; `show` prints that, then `code` and `closing` are there."""
 
-    def __init__(self, process: subprocess.Popen[bytes], file: Path) -> None:
-        self._process, self._file = process, file
-        self.closing = ""
-
-    @classmethod
-    @contextmanager
-    def of(cls, command: list[str], folder: Path, variables: Mapping[str, str], nice: int = 0) -> Iterator[Stream]:
-        """Start it; end it where whoever waits for it is interrupted."""
+    def __init__(
+        self, command: list[str], folder: Path, variables: Mapping[str, str], title: str = "", nice: int = 0
+    ) -> None:
         size = {"COLUMNS": str(shutil.get_terminal_size().columns)}
         colour = ["--color=yes"] if sys.stdout.isatty() else []
-        with tempfile.NamedTemporaryFile(prefix="bench_test_") as sink:
-            process = subprocess.Popen(
-                [*command, *colour],
-                cwd=folder,
-                env={**variables, **size},
-                stdout=sink,
-                stderr=subprocess.STDOUT,
-                preexec_fn=lambda: _give_way(nice),
-            )
-            try:
-                yield cls(process, Path(sink.name))
-            except BaseException:
-                if not sys.stdout.isatty():
-                    process.send_signal(signal.SIGINT)  # on a terminal it got the Ctrl-C itself
-                raise
-            finally:
-                _wait(process)
+        self.closing = ""
+        self._title = title
+        self._file = tempfile.NamedTemporaryFile(prefix="bench_test_")  # noqa: SIM115 - until `close`
+        self._process = subprocess.Popen(
+            [*command, *colour],
+            cwd=folder,
+            env={**variables, **size},
+            stdout=self._file,
+            stderr=subprocess.STDOUT,
+            preexec_fn=lambda: _give_way(nice),
+        )
 
     @property
     def code(self) -> int:
@@ -155,9 +141,10 @@ class Stream:
 
     def show(self) -> str:
         """Print what it has written and writes, until it ends; its last line."""
+        print(f"== pytest {self._title}".rstrip(), flush=True)
         decoder = codecs.getincrementaldecoder("utf-8")("replace")
         tail = ""
-        with self._file.open("rb") as source:
+        with open(self._file.name, "rb") as source:
             ended = False
             while not ended:
                 ended = self._process.poll() is not None  # before reading: what it wrote last must not be missed
@@ -171,14 +158,34 @@ class Stream:
         self.closing = lines[-1] if lines else ""
         return self.closing
 
+    def interrupt(self) -> None:
+        """As Ctrl-C does; on a terminal it got that itself."""
+        if not sys.stdout.isatty():
+            self._process.send_signal(signal.SIGINT)
+
+    def close(self) -> None:
+        """Wait for its end, and end it if it does not come."""
+        try:
+            self._process.wait(INTERRUPT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._file.close()
+
+
+@contextmanager
+def ending(streams: Sequence[Stream]) -> Iterator[None]:
+    """Leave no pytest behind: whoever waits for them may be interrupted."""
+    try:
+        yield
+    except BaseException:
+        for stream in streams:
+            stream.interrupt()
+        raise
+    finally:
+        for stream in streams:
+            stream.close()
+
 
 def _give_way(nice: int) -> None:
     os.nice(nice)
-
-
-def _wait(process: subprocess.Popen[bytes]) -> None:
-    try:
-        process.wait(INTERRUPT_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
