@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from hydraulic_interfaces.command_gate import CommandGate
-from hydraulic_interfaces.pacing import Pacer, release_realtime, request_realtime
+from hydraulic_interfaces.pacing import Pacer, release_realtime_for_all, request_realtime, request_realtime_for_all
 from hydraulic_interfaces.plant_backend import PlantBackend
 from hydraulic_interfaces.rate_monitor import RateMonitor
 from hydraulic_interfaces.samples import PlantSample
@@ -84,31 +84,32 @@ class PlantLoop:
         self._stopping = False
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plant_loop", daemon=True)
-        self._starter_id = 0
+        self._raised = False
         self._switch_interval = sys.getswitchinterval()
         self._wall_offset_ns = 0
 
     def start(self) -> None:
         """Start the thread; the first sample comes one period later.
 
-        The calling thread, which goes on to serve ROS, gets a priority one below: if the system took the
-        processor from it while it holds the interpreter's lock, the loop would wait for it.
+        The other threads get a priority one below. The calling one goes on to serve ROS: if the system took the
+        processor from it while it holds the interpreter's lock, the loop would wait for it. Those of the middleware
+        hand over the commands, which on a busy machine would come a cycle late or more.
         """
         gc.collect()
         gc.freeze()
         gc.disable()
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
         if self._timing.priority > 1:
-            request_realtime(self._timing.priority - 1)
-            self._starter_id = threading.get_native_id()
+            request_realtime_for_all(self._timing.priority - 1)
+            self._raised = True
         self._thread.start()
 
     def stop(self, timeout: float = 2.0) -> bool:
         """End with a last sample at 0 V and a deactivated backend; False if the backend hangs."""
         self._stopping = True
         ended = self._ended.wait(timeout)
-        if self._starter_id:
-            release_realtime(self._starter_id)
+        if self._raised:
+            release_realtime_for_all()
         sys.setswitchinterval(self._switch_interval)
         gc.enable()
         gc.unfreeze()
