@@ -15,7 +15,7 @@ from can.interfaces.socketcan.socketcan import CyclicSendTask, build_bcm_header,
 # Share of a deviation that is taken back at once, and that goes into the estimate of the kernel's own delay. The trim
 # acts two messages later; with these the loop is damped: all its poles are within 0.9 of the origin.
 _AT_ONCE, _LASTING = 0.25, 0.02
-_MOST = 0.1  # of the period
+_MOST = 0.25  # of the period
 
 
 class Trim:
@@ -26,7 +26,7 @@ class Trim:
         self._lasting = 0.0
 
     def after(self, late_ns: int) -> int:
-        """Off the period from here on; at most a tenth of it, so that no message comes much too early."""
+        """Off the period from here on; at most a quarter of it, so that no message comes much too early."""
         self._lasting = self._within(self._lasting + _LASTING * late_ns)
         return round(self._within(self._lasting + _AT_ONCE * late_ns))
 

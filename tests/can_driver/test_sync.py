@@ -61,7 +61,7 @@ class Kernel:
         return self
 
     def set_period(self, task: Any, period_ns: int) -> bool:
-        assert task is self and abs(period_ns - PERIOD) <= 0.1 * PERIOD
+        assert task is self and abs(period_ns - PERIOD) <= 0.25 * PERIOD
         self.period = period_ns * 1e-9
         return True
 

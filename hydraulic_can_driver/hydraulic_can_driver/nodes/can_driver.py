@@ -34,6 +34,7 @@ class CanPlant(PlantBackend):
     def __init__(self) -> None:
         self._bench: Bench | None = None
         self._description: dict[str, Any] = {}
+        self._priority = 0
 
     def parameters(self) -> Sequence[ParameterSpec]:
         """See `PlantBackend.parameters`."""
@@ -47,12 +48,10 @@ class CanPlant(PlantBackend):
         :raises DeviceError: a device does not answer, is another one, or refuses something.
         """
         bus = load_bus(values["bus"])
-        if values["rate"]:
-            bus = replace(bus, rate=values["rate"])
+        bus = replace(bus, rate=values["rate"] or bus.rate)
         self.hardware_id = f"can: {bus.name}"
         self._bench = Bench(bus, values["interface"], values["channel"])
-        if values["realtime_priority"]:
-            self._bench.receiver.priority = min(values["realtime_priority"] + 1, 98)
+        self._priority = min(values["realtime_priority"] + 1, 98) if values["realtime_priority"] else 0
         self._bench.boot()
         self._description = readback.description(bus, self._bench.readings)
         return ()
@@ -79,6 +78,8 @@ class CanPlant(PlantBackend):
 
     def first_instant(self, earliest_ns: int) -> int:
         """The drive goes out in time for a SYNC."""
+        # Not before: the loop gives the other threads of the process their priority when it is started.
+        self._configured.receiver.priority = self._priority
         return self._configured.beat.first_instant(earliest_ns)
 
     def step(self, stamp_ns: int, drive: float, dt: float) -> PlantSample | None:
