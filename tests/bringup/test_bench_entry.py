@@ -399,24 +399,25 @@ def test_all_tests_run_once_and_the_closing_line_sums_up(with_tests: FakeCheckou
     assert answer.returncode == 0, answer.stderr
     common = " -p no:cacheprovider"
     assert sorted(call for call in with_tests.calls() if "pytest" in call) == [
-        f"-m pytest tests/hidden_effects tests/sim tests/sysid --ignore-glob=*_node.py{common}",
+        f"-m pytest tests/hidden_effects --ignore-glob=*_node.py{common}",
         f"-m pytest tests/pump tests/sim/test_pump_node.py{common}",
+        f"-m pytest tests/sim tests/sysid --ignore-glob=*_node.py{common}",
         f"-m pytest tests/system --ignore=tests/system/test_vcan.py{common}",
         f"-m pytest tests/system/test_vcan.py{common}",
     ]
-    assert answer.stdout.count("collected 2 items") == 4
-    assert answer.stdout.splitlines()[-1].startswith("=== 8 passed, 4 warnings in ")
+    assert answer.stdout.count("collected 2 items") == 5
+    assert answer.stdout.splitlines()[-1].startswith("=== 10 passed, 5 warnings in ")
 
 
 @pytest.mark.parametrize("folder", ["system/test_vcan.py", "system --ignore", "pump", "hidden_effects"])
 def test_whichever_run_fails_fails_the_test(with_tests: FakeCheckout, folder: str) -> None:
     leaks = with_tests.bench("test", LEAKS=folder)
     assert leaks.returncode == 1
-    assert leaks.stdout.splitlines()[-1].startswith("=== 1 failed, 7 passed, 3 warnings, 2 errors in ")
+    assert leaks.stdout.splitlines()[-1].startswith("=== 1 failed, 9 passed, 4 warnings, 2 errors in ")
     assert "test_seal.py F" in leaks.stdout
     bursts = with_tests.bench("test", BURSTS=folder)
     assert bursts.returncode == 139
-    assert bursts.stdout.splitlines()[-1].startswith("=== 6 passed, 3 warnings, 1 errors in ")
+    assert bursts.stdout.splitlines()[-1].startswith("=== 8 passed, 4 warnings, 1 errors in ")
     assert "Segmentation fault" in bursts.stdout
 
 

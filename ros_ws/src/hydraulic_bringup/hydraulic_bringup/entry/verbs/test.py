@@ -18,15 +18,16 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 
 from ..bench import Bench
 
 ORDER = 2
-COMPUTING = ("tests/hidden_effects", "tests/sim", "tests/sysid")  # but for their nodes' tests, which keep time
+COMPUTING = (("tests/hidden_effects",), ("tests/sim", "tests/sysid"))  # but for their nodes' tests, which keep time
 NODES = "*_node.py"
 MACHINE = "tests/system/test_vcan.py"  # where this kernel has no vcan, a virtual machine that takes all processors
-FIRST = ("tests/system", "tests/contract", "tests/bringup")  # half of the waiting; any other folder goes to the rest
+FIRST = ("tests/system", "tests/contract")  # half of the waiting; any other folder goes to the rest
 NICE = 15
 INTERRUPT_S = 15.0  # for pytest to end its node processes and to sum up
 POLL_S = 0.1
@@ -49,7 +50,7 @@ def run(bench: Bench, arguments: list[str]) -> int:
             failed.append(name)
     root = bench.checkout.root
     pytest = [python, "-m", "pytest"]
-    if arguments or not all((root / folder).is_dir() for folder in COMPUTING):
+    if arguments or not all((root / folder).is_dir() for folder in chain(*COMPUTING)):
         here = Path.cwd() if root in Path.cwd().parents else root  # so that given paths mean what they say
         only = Stream([*pytest, *arguments], here, variables)
         with ending([only]):
@@ -67,7 +68,7 @@ def _all(pytest: list[str], root: Path, variables: Mapping[str, str]) -> tuple[i
     begun = time.monotonic()
     machine, halves = _keep_time(root)
     # These need no more than what the others leave of the processors.
-    computing = [*COMPUTING, f"--ignore-glob={NODES}"]
+    computing = [[*folders, f"--ignore-glob={NODES}"] for folders in COMPUTING]
     streams: list[Stream] = []
 
     def start(selection: Sequence[str], nice: int = 0) -> None:
@@ -75,13 +76,14 @@ def _all(pytest: list[str], root: Path, variables: Mapping[str, str]) -> tuple[i
         streams.append(Stream(command, root, variables, " ".join(selection), nice))
 
     with ending(streams):
-        start(computing, NICE)
+        for selection in computing:
+            start(selection, NICE)
         if machine:
             start(machine)
             streams[-1].show()
         for half in halves:
             start(half)
-        for stream in (*streams[-len(halves) :], streams[0]):
+        for stream in (*streams[-len(halves) :], *streams[: len(computing)]):
             stream.show()
     closing = summed([stream.closing for stream in streams], time.monotonic() - begun)
     bad = [stream for stream in streams if stream.code]
@@ -95,9 +97,9 @@ def _keep_time(root: Path) -> tuple[list[str], tuple[list[str], list[str]]]:
     """Selections of the tests that keep time: what has to have the machine for itself, and two halves of the rest."""
     machine = [MACHINE] if (root / MACHINE).is_file() else []
     folders = [str(d.relative_to(root)) for d in sorted((root / "tests").iterdir()) if any(d.glob("test_*.py"))]
-    nodes = [str(f.relative_to(root)) for folder in COMPUTING for f in sorted((root / folder).glob(NODES))]
+    nodes = [str(f.relative_to(root)) for folder in chain(*COMPUTING) for f in sorted((root / folder).glob(NODES))]
     first = [folder for folder in FIRST if folder in folders]
-    rest = [folder for folder in folders if folder not in (*FIRST, *COMPUTING)]
+    rest = [folder for folder in folders if folder not in (*FIRST, *chain(*COMPUTING))]
     return machine, ([*first, *(f"--ignore={file}" for file in machine)], [*rest, *nodes])
 
 
