@@ -1,6 +1,6 @@
 """The driver node against the virtual devices over the kernel's own CAN (SocketCAN, vcan), with candump as witness.
 
-Under software emulation a program runs some twenty times slower: the bus has 20 Hz instead of 500, and the patience of
+Under software emulation a program runs some twenty times slower: the bus has 5 Hz instead of 500, and the patience of
 the bus file is stretched, so that a machine that is busy besides does not look like a fault. Frames, states and numbers
 are the same.
 """
@@ -31,15 +31,15 @@ pytest.importorskip("rclpy")
 GUEST = Path(vcan.__file__).with_name("vcan_guest.py")
 SHIPPED = Path(__file__).parents[2] / "hydraulic_can_driver" / "hydraulic_can_driver" / "buses" / "bench.yaml"
 CHANNEL = "vcanbench"
-RATE = 20.0
-SHORTEST = 20  # samples of a piece of the record between two lost ones
+RATE = 5.0  # the drive is sent a quarter of the period before its SYNC: a cycle takes up to 40 ms
+SHORTEST = 12  # samples of a piece of the record between two lost ones
 PATIENCE_S = 10.0
 MACHINE_S = 900.0  # a machine that is busy besides; with two free processors it takes a minute and a half
 
 PLAN = f"""
 name: multisine
-signal: {{kind: random_phase_multisine, rms: 1.0, period: 6.0, frequency_min: 0.2, frequency_max: 3.0, seed: 1}}
-duration: 12.0
+signal: {{kind: random_phase_multisine, rms: 1.0, period: 12.0, frequency_min: 0.1, frequency_max: 1.5, seed: 1}}
+duration: 36.0
 rate: {RATE}
 fade_in: 0.25
 fade_out: 0.25
@@ -173,8 +173,8 @@ def test_the_state_machine_is_climbed_step_by_step_and_left_at_0(run: Run) -> No
 
 def test_the_kernel_sends_the_sync_and_every_device_answers_it(run: Run) -> None:
     syncs = np.array([f.time for f in run.of(SYNC)])
-    assert len(syncs) > 12.0 * RATE
-    assert np.median(np.diff(syncs)) == pytest.approx(1.0 / RATE, rel=0.25)  # as good as an emulated clock
+    assert len(syncs) > 36.0 * RATE
+    assert np.median(np.diff(syncs)) == pytest.approx(1.0 / RATE, rel=0.05)  # as good as an emulated clock
     answers = {number: len(run.of(number)) for number in SAMPLED}
     assert min(answers.values()) >= 0.97 * len(syncs), answers
     assert max(answers.values()) <= len(syncs), answers
@@ -186,13 +186,14 @@ def test_the_record_holds_what_was_on_the_wire(run: Run) -> None:
     """Decoded here by hand: 1 um and -0.762 m at 0 counts; 16384 counts for 10 V."""
     wire = np.array([int.from_bytes(f.data[:4], "little", signed=True) for f in run.of(POSITION)]) * 1e-6 - 0.762
     drives = np.array([int.from_bytes(f.data[2:4], "little", signed=True) for f in run.of(DRIVE)]) * 10.0 / 16384
-    (record,) = read_records(run.folder / "bag", "resample")
-    position, drive = np.asarray(record["position"]), np.asarray(record["drive"])
-    assert share_among(position, wire) > 0.95
-    assert share_among(drive, drives) > 0.95
-    assert np.ptp(position) > 0.01
-    assert np.asarray(record["pressure_a"]) == pytest.approx(7e6, abs=1e3)
-    assert np.asarray(record["pressure_supply"]) == pytest.approx(14e6, abs=1e3)
+    pieces = read_records(run.folder / "bag", "split")
+    found = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0].channels}
+    assert len(found["position"]) > 12.0 * RATE
+    assert share_among(found["position"], wire) > 0.95
+    assert share_among(found["drive"], drives) > 0.95
+    assert np.ptp(found["position"]) > 0.01
+    assert found["pressure_a"] == pytest.approx(7e6, abs=1e3)
+    assert found["pressure_supply"] == pytest.approx(14e6, abs=1e3)
 
 
 def share_among(values: np.ndarray, allowed: np.ndarray) -> float:
@@ -209,7 +210,7 @@ def test_the_plant_is_identified_from_the_record(run: Run) -> None:
     Sampled, they are 1 − (1 + p) z⁻¹ + p z⁻² with p = exp(−T/LAG), and b₁ + b₂ = GAIN · T · (1 − p).
     """
     pieces = [piece for piece in read_records(run.folder / "bag", "split") if len(piece) >= SHORTEST]
-    assert sum(map(len, pieces)) > 5.0 * RATE, f"pieces of {[len(piece) for piece in pieces]} samples"
+    assert sum(map(len, pieces)) > 8.0 * RATE, f"pieces of {[len(piece) for piece in pieces]} samples"
     settings = Settings(structure=Arx(ArxOrder(2, 2, 1)), sampling_time=1.0 / RATE)
     result, model = identify_model(pieces, [max(pieces, key=len)], settings)
     assert isinstance(model, ArxModel)

@@ -31,7 +31,7 @@ from hydraulic_interfaces.nodes.log_callers import know_log_callers
 from hydraulic_interfaces.pacing import request_realtime
 
 # What the virtual hydraulics do; the identification has to find it.
-GAIN, LAG, START = 0.02, 0.2, 0.1  # (m/s)/V, s, m
+GAIN, LAG, START = 0.02, 0.3, 0.1  # (m/s)/V, s, m
 LISTENERS = Path("/proc/net/can/rcvlist_all")  # who receives every frame of an interface: candump, once it is up
 READY_S, RUN_S, END_S = 200.0, 500.0, 60.0
 
@@ -139,9 +139,10 @@ def run(channel: str, folder: Path, children: Children) -> None:
     """Those that listen first: they start while nothing keeps the processors busy yet."""
     recorder = parameters(output=folder / "bag", stop_on_experiment_end=True, exit_when_done=True)
     children.start("recorder", lambda: hydraulic_sysid.nodes.recorder.main(recorder))
+    # Commands are some samples under way here: not a plant that does something else for 0.6 s.
     excitation = parameters(
         plan=folder / "plan.yaml", autostart=True, exit_when_done=True, listeners=2, start_timeout=RUN_S,
-        state_timeout=10.0,
+        state_timeout=10.0, applied_tolerance=10.0,
     )  # fmt: skip
     children.start("excitation", lambda: hydraulic_sysid.nodes.excitation.main(excitation))
     children.start("devices", lambda: devices(folder, channel))
