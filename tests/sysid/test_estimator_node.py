@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -50,13 +51,17 @@ class Bench:
     def wiggle(self, count: int) -> None:
         """Random drives until that many sets of coefficients have come since."""
         seen = len(self.heard["model_parameters"])
+        self.wiggle_until(lambda: len(self.heard["model_parameters"]) >= seen + count, f"{count} sets of coefficients")
 
-        def enough() -> bool:
+    def wiggle_until(self, condition: Callable[[], bool], what: str) -> None:
+        """Random drives until the condition holds."""
+
+        def holds() -> bool:
             # Another drive every 0.1 s, whatever the pace of this loop.
             self.source.drive = float(np.random.default_rng(int(time.monotonic() * 10)).uniform(-2.0, 2.0))
-            return len(self.heard["model_parameters"]) >= seen + count
+            return condition()
 
-        self.wait_until(enough, f"{count} sets of coefficients")
+        self.wait_until(holds, what)
 
     def set_forgetting(self, value: float) -> Any:
         number = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
@@ -104,8 +109,8 @@ def test_the_topics_carry_what_the_pure_parts_make_of_the_states(bench: Bench, t
     assert len(poles.effort) == 2 and fit.effort[0] > 70.0
     assert np.median(np.diff(stamps(heard["model_fit"]))) == PERIOD_NS
 
-    # An integrator with a gain of 44 mm/s per volt shows itself.
-    assert max(same.position) == pytest.approx(1.0, abs=0.02)
+    # An integrator shows itself, sooner or later by how many samples a busy machine lets through.
+    bench.wiggle_until(lambda: abs(max(bench.heard["model_poles"][-1].position) - 1.0) < 0.02, "an integrator's pole")
     answer = bench.client.call("std_srvs/srv/Trigger", f"{NODE}/save")
     assert answer.success, answer.message
     model, content = read_linear_model(file)
