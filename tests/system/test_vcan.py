@@ -32,7 +32,7 @@ GUEST = Path(vcan.__file__).with_name("vcan_guest.py")
 SHIPPED = Path(__file__).parents[2] / "hydraulic_can_driver" / "hydraulic_can_driver" / "buses" / "bench.yaml"
 CHANNEL = "vcanbench"
 RATE = 5.0  # the drive is sent a quarter of the period before its SYNC: a cycle takes up to 40 ms
-SHORTEST = 12  # samples of a piece of the record between two lost ones
+SHORTEST = 20  # samples of a piece of the record between two lost ones; a noise floor needs them
 PATIENCE_S = 10.0
 MACHINE_S = 900.0  # a machine that is busy besides; with two free processors it takes a minute and a half
 
