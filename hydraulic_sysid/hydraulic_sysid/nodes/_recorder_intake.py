@@ -17,6 +17,11 @@ from hydraulic_sysid.bag.types import header_stamp
 
 # Messages of a topic that wait while this process is held up: five seconds at 1 kHz.
 _DEPTH = 5000
+# How long commands are left alone while no state comes: without states they are no record.
+_PLANT_S = 10.0
+
+
+_LAST = "command"
 
 
 class _Channel:
@@ -33,16 +38,25 @@ class _Channel:
 
 
 class Intake:
-    """Takes what has come on all topics; all calls must come from one thread."""
+    """Takes what has come on all topics; all calls must come from one thread.
+
+    Commands are subscribed to last, once the plant's states come: who waits for a listener to commands (the excitation
+    does) then waits until the plant has been found too, and no first sample is lost.
+    """
 
     def __init__(self, node: Node, recording: Recording) -> None:
-        self._recording = recording
-        self._channels = [_Channel(node, row) for row in TOPICS]
+        self._node, self._recording = node, recording
+        self._channels = [_Channel(node, row) for row in TOPICS if row.name != _LAST]
+        self._plant_due = time.monotonic() + _PLANT_S
+        self._whole = False
         self._experiment_topic = topic("experiment")
         self.experiment = ExperimentLog()
 
     def drain(self) -> None:
         """Queue every waiting message for writing."""
+        if not self._whole and (self.reached_ns() is not None or time.monotonic() > self._plant_due):
+            self._whole = True
+            self._channels += [_Channel(self._node, row) for row in TOPICS if row.name == _LAST]
         append = self._recording.append
         for channel in self._channels:
             bag_topic, continuity = channel.topic, channel.continuity
