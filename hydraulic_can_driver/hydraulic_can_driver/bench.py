@@ -213,7 +213,10 @@ class Bench:
         except BusDownError as error:
             self.faults.report(Fault.BUS, str(error))
             in_time = False
+        cycle = self.frames.cycle
         complete = self.frames.wait(time.monotonic() + self.bus.monitoring.frames_within * self._period)
+        # Where the kernel's next SYNC has come meanwhile, the frames are answers to that.
+        complete &= self.frames.cycle == cycle
         self.frames.end()
         return complete and in_time, frame
 

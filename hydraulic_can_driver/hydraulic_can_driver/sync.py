@@ -140,11 +140,14 @@ class KernelBeat:
         due, half = self._due(sync_ns), self._period_ns // 2
         early = self._frames.instant_ns > due - half
         self._master.send(cob_id, drive_frame)
+        sent = time.monotonic_ns()
         came = early or self._frames.wait_sync(due - half, due + half)
+        heard = self._frames.instant_ns
         if came:
-            self._heard.append(self._frames.instant_ns)
-            self._keep_step(self._frames.instant_ns - due)
-        return came and not early
+            self._heard.append(heard)
+            self._keep_step(heard - due)
+        # A SYNC from before the drive may be heard after it was sent.
+        return came and not early and sent <= heard < due + half
 
     def _due(self, sync_ns: int) -> int:
         """The SYNC at `sync_ns` on the monotonic clock."""
