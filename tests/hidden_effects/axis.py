@@ -15,6 +15,7 @@ SUBSTEPS = 20
 KP, KV = 160.18, 243.45  # 1/s, V/(m/s)
 FORCE = 35.15  # N/V
 STEP = 1e-7  # m, encoder
+NOISE = 3e-6  # m; a sensor well below the bristles' 8 um would make a question of how they slip
 PLAIN = {"mass": 95.1, "viscous": 203.5, "coulomb": 20.4, "load": -3.2, "bristle": 8e-6}
 STROKES = ((0.24, 2.6), (0.0, 2.6), (0.24, 3.6), (0.0, 3.6), (0.12, 2.2), (0.24, 2.2), (0.0, 5.0))  # to m, in s
 REST = 0.25  # s between strokes
@@ -61,7 +62,7 @@ def run(rng: np.random.Generator, viscous_difference: float = 0.0, **values: flo
     goal = reference()
     out = np.empty((len(goal), 2))
     _follow(
-        goal, 1e-6 * rng.standard_normal(len(goal)), p["mass"], p["viscous"] + viscous_difference,
+        goal, NOISE * rng.standard_normal(len(goal)), p["mass"], p["viscous"] + viscous_difference,
         p["viscous"] - viscous_difference, p["coulomb"], p["coulomb"], p["load"], p["bristle"], out,
     )  # fmt: skip
     return {"time_s": np.arange(len(goal)) / RATE, "command_V": out[:, 0].round(5), "position_m": out[:, 1].round(7)}
