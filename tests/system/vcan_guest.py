@@ -31,7 +31,7 @@ from hydraulic_interfaces.nodes.log_callers import know_log_callers
 from hydraulic_interfaces.pacing import request_realtime
 
 # What the virtual hydraulics do; the identification has to find it.
-GAIN, LAG, START = 0.02, 0.3, 0.1  # (m/s)/V, s, m
+GAIN, LAG, START = 0.02, 0.6, 0.1  # (m/s)/V, s, m
 LISTENERS = Path("/proc/net/can/rcvlist_all")  # who receives every frame of an interface: candump, once it is up
 READY_S, RUN_S, END_S = 200.0, 500.0, 60.0
 
