@@ -15,7 +15,6 @@ RIGHT_FIRST = (
     benches.Bench("single", ("coulomb_friction",), "strong", 1),
     benches.Bench("single", ("valve_deadband",), "mild", 1),
     benches.Bench("single", ("entrained_air",), "strong", 1),
-    benches.Bench("single", ("command_delay",), "mild", 1),
     benches.Bench("single", ("supply_droop",), "mild", 1),
     benches.Bench("single", ("sensor_lag",), "strong", 1),
 )
