@@ -171,7 +171,7 @@ CASES |= {("driver", step): partial(cut_driver, step) for step in STEPS}
 def outcomes() -> Iterator[dict[tuple[str, str], Future[None]]]:
     """All cases, several at once: mostly they wait for answers that do not come."""
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(AT_ONCE) as pool:
-        patch.setattr(master, "_ANSWER_S", 0.6)
+        patch.setattr(master, "_ANSWER_S", 1.2)
         yield {case: pool.submit(run) for case, run in CASES.items()}
         pool.shutdown(cancel_futures=True)
 
