@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +12,7 @@ from hydraulic_sim.linear import closed_form
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.__main__ import main
 from hydraulic_sysid.bandwidth import BandwidthError, from_model, from_record, from_rehearsal, from_response
-from hydraulic_sysid.excitation import Plan, load_plan, save_plan
-from hydraulic_sysid.excitation.signals.random_phase_multisine import RandomPhaseMultisine
+from hydraulic_sysid.excitation import load_plan
 from hydraulic_sysid.records import Record
 
 BENCH = "moog_mcr_m_1002_bench"
@@ -108,45 +106,3 @@ def test_the_verb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "position, closed loop" in capsys.readouterr().out
     assert main(["bandwidth", "--out", str(tmp_path / "c")]) == 2
     assert "either a --model or a --record" in capsys.readouterr().err
-
-
-def test_the_excitation_node_measures_it(
-    launch: Any, client: Any, wait_until: Any, tmp_path: Path, compiled_physics: None
-) -> None:
-    """`measure_bandwidth` plays the probe on the running plant and publishes what it found."""
-    from std_msgs.msg import String
-
-    from hydraulic_interfaces.qos import profile
-
-    drive = RandomPhaseMultisine(1.0, 2.0, 0.5, 100.0, seed=1, crest="low")
-    rests = {"fade_in": 0.3, "fade_out": 0.3, "rest_before": 0.1, "rest_after": 0.1}
-    plan = Plan("probe", drive, 0.2, duration=6.8, rate=250.0, **rests)  # slow enough for a busy machine
-    save_plan(plan, tmp_path / "short.yaml")
-    launch(
-        "hydraulic_sim.nodes.simulator", "--autostart", "--ros-args", "-p", f"model:={BENCH}",
-        "-p", "enable_on_activate:=true", "-p", "watchdog:=1.0", "-p", "rate:=250.0",
-    )  # fmt: skip
-    launch(
-        "hydraulic_sysid.nodes.excitation", "--ros-args", "-p", f"probe:={tmp_path / 'short.yaml'}",
-        "-p", "state_timeout:=2.0",
-    )  # fmt: skip
-    heard: list[Any] = []
-    client.node.create_subscription(String, "/actuator/excitation/bandwidth", heard.append, profile("latched"))
-    client.wake()
-
-    def begun() -> bool:
-        answer = client.call("std_srvs/srv/Trigger", "/actuator/excitation/measure_bandwidth")
-        return answer.success or "a run is on" in answer.message
-
-    for attempt in range(1, 4):
-        wait_until(begun, "the probe to begin")
-        wait_until(lambda: len(heard) >= attempt, "the bandwidth")  # noqa: B023 - called at once
-        found = json.loads(heard[-1].data)
-        if found["event"] == "finished":
-            break
-        # A machine that drops states is told so, and nothing is made up.
-        assert "of the states are missing" in found["reason"]
-    else:
-        pytest.skip(found["reason"])
-    assert 0.5 < found["position_bandwidth"] < 6.0
-    assert found["velocity_gain"] == pytest.approx(0.0434, rel=0.03)
