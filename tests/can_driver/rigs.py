@@ -55,11 +55,7 @@ class Rig:
     def run(self) -> Loop:
         """Boot, start, and cycle from now on."""
         self.bench.boot()
-        self.bench.start()
-        self.loop = Loop(self.bench)
-        self.loop.start()
-        self.loop.first.wait()
-        return self.loop
+        return self._cycle()
 
     def again(self, boot: bool) -> Loop:
         """Stop, and run once more."""
@@ -70,6 +66,9 @@ class Rig:
             self.bench.stop()
         if boot:
             self.bench.boot()
+        return self._cycle()
+
+    def _cycle(self) -> Loop:
         self.bench.start()
         self.loop = Loop(self.bench)
         self.loop.start()

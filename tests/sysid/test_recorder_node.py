@@ -14,6 +14,9 @@ from mcap.reader import make_reader  # noqa: E402
 from rosbags.rosbag2 import Reader  # noqa: E402
 
 from hydraulic_interfaces.contract import absolute, find_topic, topic  # noqa: E402
+from hydraulic_interfaces.conversions import StateEncoder, interface_class  # noqa: E402
+from hydraulic_interfaces.qos import profile  # noqa: E402
+from hydraulic_interfaces.samples import PlantSample  # noqa: E402
 from hydraulic_sysid.bag import recover  # noqa: E402
 from hydraulic_sysid.bag.types import typestore  # noqa: E402
 
@@ -47,8 +50,6 @@ def statuses(client: Any) -> list[dict[str, Any]]:
     """What the recorder tells on its status topic."""
     from std_msgs.msg import String
 
-    from hydraulic_interfaces.qos import profile
-
     heard: list[dict[str, Any]] = []
     name = absolute("recorder/status")
     client.node.create_subscription(
@@ -68,6 +69,22 @@ def status_of(statuses: list[dict[str, Any]], wait_until: Any) -> Callable[[str]
         return dict(wait_until(found, f"a status {state!r}")[-1])
 
     return find
+
+
+def test_it_listens_to_commands_once_the_plant_is_heard(
+    launch: Callable[..., Any], client: Any, status_of: Any, wait_until: Any, tmp_path: Path
+) -> None:
+    """Whoever waits for a listener to commands may then begin: the first state is not lost."""
+    launch(NODE, *options(output=str(tmp_path / "bag")))
+    assert status_of("recording")
+    node, state = client.node, find_topic("state")
+    commands = node.create_publisher(interface_class(state.type), topic("command"), profile("command"))
+    states = node.create_publisher(interface_class(state.type), topic("state"), profile("state"))
+    wait_until(lambda: states.get_subscription_count() == 1, "the recorder on the states")
+    assert commands.get_subscription_count() == 0
+    encode = StateEncoder()
+    states.publish(encode(PlantSample(FIRST_STAMP, 0.0, 0.0, 0.0, 0.0)))
+    wait_until(lambda: commands.get_subscription_count() == 1, "the recorder on the commands", 8.0)
 
 
 def test_every_message_of_an_experiment(

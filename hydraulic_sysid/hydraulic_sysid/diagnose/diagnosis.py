@@ -81,7 +81,7 @@ def diagnose(
         curves = shapes((found.base if stand_in else found.final).anchor, say)
     known = parameter_errors(found.final.anchor)
     diagnosed = finished(found, known, records, held_out)
-    result = document(model, records, held_out, parts, settings, found, others, known, kind, curves)
+    result = document(model, records, held_out, parts, settings, found, others, family, known, kind, curves)
     tied = {}
     for name in found.added if kind == verdict.TIED else ():
         same = verdict.same_as(name, others, family)
@@ -89,25 +89,22 @@ def diagnose(
     say("balances")
     base, final, added = found.base.model, found.final.model, bool(found.added)
     del found  # its sensitivities would take up the memory that the balances need
-    before, after = _balances(base, records), _balances(final, records) if added else []
-    blamed = _subsystems(base if stand_in else final, records) if kind == verdict.OUTSIDE else []
-    add_balances(result, before, after, blamed)
+    outside = kind == verdict.OUTSIDE
+    before, blamed = _balances(base, records, blame=outside and stand_in)
+    after, blamed_after = _balances(final, records, blame=outside and not stand_in) if added else ([], [])
+    add_balances(result, before, after, blamed or blamed_after)
     return Diagnosis(diagnosed, tied, result)
 
 
-def _balances(model: Model, records: Sequence[Record]) -> list[dict[str, Any]]:
+def _balances(model: Model, records: Sequence[Record], blame: bool) -> tuple[list[dict[str, Any]], list[str]]:
+    """The balances' figures; and, if somebody is to ``blame``, subsystems by what each explains of them, most first."""
     try:
-        return balance_figures(model, records)
+        if not blame:
+            return balance_figures(model, records), []
+        found = locate(model, records, maps=False)
     except (LocateError, SimulationError):
-        return []
-
-
-def _subsystems(model: Model, records: Sequence[Record]) -> list[str]:
-    """Subsystems by how much of the balances' residuals each explains, the most first."""
-    try:
-        return [str(s["name"]) for s in locate(model, records, maps=False)["subsystem"]]
-    except (LocateError, SimulationError):
-        return []
+        return [], []
+    return found["balances"], [str(s["name"]) for s in found["subsystem"]]
 
 
 def finished(found: Found, known: Mapping[str, Known], records: Sequence[Record], held_out: Sequence[Record]) -> Model:

@@ -30,13 +30,12 @@ _TELLING = 0.5  # share of what is left, from which a curve says where it is
 
 def document(
     model: Model, records: Sequence[Record], held_out: Sequence[Record], parts: Split, settings: Settings,
-    found: Found, rivals: Mapping[str, Sequence[Rival]], known: Mapping[str, Known], kind: str,
-    shapes: Sequence[Shape],
+    found: Found, rivals: Mapping[str, Sequence[Rival]], family: Mapping[str, Sequence[str]],
+    known: Mapping[str, Known], kind: str, shapes: Sequence[Shape],
 ) -> dict[str, Any]:  # fmt: skip
-    """The document, still without balances (`add_balances`); arrays NumPy, SI."""
+    """The document, still without balances (`add_balances`); arrays NumPy, SI. ``family``: see `verdict.alike`."""
     base, final = found.base, found.final
     channels = list(dict.fromkeys(c for p in parts.pieces for c in p.channels))
-    family = verdict.alike(model, found.added, channels)
     named = _named(found, rivals, kind, family)
     imitations = verdict.imitated([*records, *held_out])
     effects = _effects(found, rivals, known)
@@ -95,7 +94,7 @@ def added_document(
     found: Found, known: Mapping[str, Known], confirmed: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """The document of one effect added on request: the same keys, as far as they apply."""
-    whole = document(model, records, held_out, parts, settings, found, {}, known, verdict.MISSING, ())
+    whole = document(model, records, held_out, parts, settings, found, {}, {}, known, verdict.MISSING, ())
     before, after = found.base.level.rms_held_out, found.final.level.rms_held_out
     name = found.added[0]
     whole |= heading("add")

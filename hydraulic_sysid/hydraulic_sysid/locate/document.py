@@ -40,8 +40,7 @@ def balance_figures(model: Model, records: Sequence[Record]) -> list[dict[str, A
         return []
     balances = Balances(model, spool_measured="spool" in names)
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        studies = list(pool.map(lambda i: study(balances, records[i], names, (), seed=i), range(len(records))))
-    return figures.balances(studies, names, False)
+        return figures.balances(_studies(pool, balances, records, names, ()), names, maps=False)
 
 
 def locate(
@@ -59,17 +58,12 @@ def locate(
     balances = Balances(model, spool_measured="spool" in names)
     keys = _movable(model) if names else []
 
-    def one(index: int) -> Study:
-        if progress is not None:
-            progress(records[index].name)
-        return study(balances, records[index], names, keys, seed=index)
-
     studies: list[Study] = []
     verdict: Verdict | None = None
     lines: list[float] = []
     if names:
         with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-            studies = list(pool.map(one, range(len(records))))
+            studies = _studies(pool, balances, records, names, keys, progress)
             lines = common_lines([s.own.white for s in studies], studies[0].rate)
             verdict = judge(balances, studies, keys, lines, pool)
     entries = figures.balances(studies, names, maps) if studies else []
@@ -94,6 +88,18 @@ def locate(
     result["findings"] = words.findings(result)
     result["verdict"] = words.verdict(result)
     return result
+
+
+def _studies(
+    pool: Executor, balances: Balances, records: Sequence[Record], names: tuple[str, ...], keys: Sequence[str],
+    progress: Callable[[str], None] | None = None,
+) -> list[Study]:  # fmt: skip
+    def one(index: int) -> Study:
+        if progress is not None:
+            progress(records[index].name)
+        return study(balances, records[index], names, keys, seed=index)
+
+    return list(pool.map(one, range(len(records))))
 
 
 def judge(

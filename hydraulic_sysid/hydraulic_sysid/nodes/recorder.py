@@ -1,7 +1,8 @@
 """Node `/actuator/recorder`: every topic of the contract, serialised as it comes, into a rosbag2 folder.
 
 `~/status` (latched JSON) says "recording" once the bag is open and the subscriptions are up, with the number of
-publishers of each topic, and "closed" once the bag is finished, with the number of messages per topic.
+publishers of each topic, and "closed" once the bag is finished, with the number of messages per topic. To commands it
+listens once the plant's states come: who waits for listeners to commands then loses no first sample.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides.
 Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 """
 
-from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sysid.diagnose.shapes.triangle import curve
 
 VARIABLES = ("position", "speed", "size_of_load_pressure", "mean_pressure", "time")
 
@@ -27,24 +27,13 @@ def add(position, velocity, load_pressure, pressure_a, pressure_b, t, direction,
     return -height * part * direction if part > 0.0 else 0.0
 
 
-EFFECT = Effect(
+EFFECT = curve(
     slot="force",
     summary="dry friction of any shape",
     kernel=add,
-    parameters=(
-        Parameter("height", "N", 100.0, (-1e7, 1e7), "height of the triangle", "shape of a residual", null=0.0),
-        Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", "shape of a residual", free=False),
-        Parameter(
-            "centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", "shape of a residual", free=False
-        ),
-        Parameter(
-            "width", "1", 1.0, (1e-12, 1e12), "half the foot [the variable's unit]", "shape of a residual", free=False
-        ),
-    ),
+    unit="N",
+    size=100.0,
+    bounds=(-1e7, 1e7),
     equation="F = -height*hat(z)*direction",
-    source="de Boor (1978), A Practical Guide to Splines, ch. III",
-    excited_by="whatever moves the variable",
-    confused_with=(),
-    told_apart_by="the variable over which the curve explains most",
     order=90,
 )

@@ -8,7 +8,7 @@ hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides.
 Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 """
 
-from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sysid.diagnose.shapes.triangle import curve
 
 VARIABLES = ("opening", "velocity", "load_pressure", "position", "time")
 
@@ -27,24 +27,13 @@ def add(opening, velocity, load_pressure, position, t, over, centre, width, heig
     return opening + height * part if part > 0.0 else opening
 
 
-EFFECT = Effect(
+EFFECT = curve(
     slot="opening",
     summary="an addition to the valve's opening of any shape",
     kernel=add,
-    parameters=(
-        Parameter("height", "1", 0.002, (-1.0, 1.0), "height of the triangle", "shape of a residual", null=0.0),
-        Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", "shape of a residual", free=False),
-        Parameter(
-            "centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", "shape of a residual", free=False
-        ),
-        Parameter(
-            "width", "1", 1.0, (1e-12, 1e12), "half the foot [the variable's unit]", "shape of a residual", free=False
-        ),
-    ),
+    unit="1",
+    size=0.002,
+    bounds=(-1.0, 1.0),
     equation="o = s + height*hat(z)",
-    source="de Boor (1978), A Practical Guide to Splines, ch. III",
-    excited_by="whatever moves the variable",
-    confused_with=(),
-    told_apart_by="the variable over which the curve explains most",
     order=95,
 )

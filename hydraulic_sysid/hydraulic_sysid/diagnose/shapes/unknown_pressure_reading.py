@@ -8,7 +8,7 @@ hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides.
 Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 """
 
-from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sysid.diagnose.shapes.triangle import curve
 
 VARIABLES = ("pressure_a", "pressure_b", "time")
 
@@ -26,24 +26,13 @@ def add(reading_a, reading_b, t, over, centre, width, height):
     return reading_a + a, reading_b + b
 
 
-EFFECT = Effect(
+EFFECT = curve(
     slot="pressure_sensor",
     summary="an error of the pressure transducers of any shape",
     kernel=add,
-    parameters=(
-        Parameter("height", "Pa", 1e4, (-1e9, 1e9), "height of the triangle", "shape of a residual", null=0.0),
-        Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", "shape of a residual", free=False),
-        Parameter(
-            "centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", "shape of a residual", free=False
-        ),
-        Parameter(
-            "width", "1", 1.0, (1e-12, 1e12), "half the foot [the variable's unit]", "shape of a residual", free=False
-        ),
-    ),
+    unit="Pa",
+    size=1e4,
+    bounds=(-1e9, 1e9),
     equation="y = p + height*hat(z)",
-    source="de Boor (1978), A Practical Guide to Splines, ch. III",
-    excited_by="whatever moves the variable",
-    confused_with=(),
-    told_apart_by="the variable over which the curve explains most",
     order=96,
 )

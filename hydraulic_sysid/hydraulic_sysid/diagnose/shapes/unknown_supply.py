@@ -8,7 +8,7 @@ hat(z) is 1 at ``centre`` and falls to 0 at ``width`` on both sides.
 Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 """
 
-from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sysid.diagnose.shapes.triangle import curve
 
 VARIABLES = ("size_of_opening", "velocity", "time", "load_pressure")
 
@@ -25,24 +25,13 @@ def add(opening, velocity, t, load_pressure, over, centre, width, height):
     return height * part if part > 0.0 else 0.0
 
 
-EFFECT = Effect(
+EFFECT = curve(
     slot="ripple",
     summary="a supply pressure of any shape",
     kernel=add,
-    parameters=(
-        Parameter("height", "Pa", 100000.0, (-1e8, 1e8), "height of the triangle", "shape of a residual", null=0.0),
-        Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", "shape of a residual", free=False),
-        Parameter(
-            "centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", "shape of a residual", free=False
-        ),
-        Parameter(
-            "width", "1", 1.0, (1e-12, 1e12), "half the foot [the variable's unit]", "shape of a residual", free=False
-        ),
-    ),
+    unit="Pa",
+    size=100000.0,
+    bounds=(-1e8, 1e8),
     equation="p_S = p_0 + height*hat(z)",
-    source="de Boor (1978), A Practical Guide to Splines, ch. III",
-    excited_by="whatever moves the variable",
-    confused_with=(),
-    told_apart_by="the variable over which the curve explains most",
     order=90,
 )

@@ -84,7 +84,6 @@ class PlantLoop:
         self._stopping = False
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plant_loop", daemon=True)
-        self._raised = False
         self._switch_interval = sys.getswitchinterval()
         self._wall_offset_ns = 0
 
@@ -101,14 +100,13 @@ class PlantLoop:
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
         if self._timing.priority > 1:
             request_realtime_for_all(self._timing.priority - 1)
-            self._raised = True
         self._thread.start()
 
     def stop(self, timeout: float = 2.0) -> bool:
         """End with a last sample at 0 V and a deactivated backend; False if the backend hangs."""
         self._stopping = True
         ended = self._ended.wait(timeout)
-        if self._raised:
+        if self._timing.priority > 1:
             release_realtime_for_all()
         sys.setswitchinterval(self._switch_interval)
         gc.enable()

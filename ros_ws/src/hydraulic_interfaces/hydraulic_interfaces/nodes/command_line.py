@@ -11,6 +11,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from hydraulic_interfaces.nodes.discovery import stay_local
+from hydraulic_interfaces.nodes.log_callers import know_log_callers
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 
 
@@ -27,7 +28,8 @@ def parser(description: str, parameters: Sequence[ParameterSpec]) -> argparse.Ar
 def start(options: argparse.ArgumentParser, argv: list[str] | None) -> argparse.Namespace:
     """Read the command line (`argv`, or that of the process) and start rclpy, found on this machine only.
 
-    Signals are left to the caller. Leaves with exit code 2 for options that do not exist or are malformed.
+    To be called before the node is made, while nothing is kept waiting yet. Signals are left to the caller.
+    Leaves with exit code 2 for options that do not exist or are malformed.
     """
     arguments = sys.argv if argv is None else [sys.argv[0], *argv]
     stay_local()
@@ -36,4 +38,5 @@ def start(options: argparse.ArgumentParser, argv: list[str] | None) -> argparse.
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # rclpy has no common base for what it says about its arguments
         options.error(f"ROS arguments: {' '.join(str(error).split())}")
+    know_log_callers()
     return given

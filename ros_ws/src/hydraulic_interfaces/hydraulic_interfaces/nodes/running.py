@@ -15,7 +15,6 @@ from rclpy.parameter import Parameter
 
 from hydraulic_interfaces.nodes import command_line
 from hydraulic_interfaces.nodes.exit_guard import exit_guard
-from hydraulic_interfaces.nodes.log_callers import know_log_callers
 from hydraulic_interfaces.nodes.plant_node import PlantNode, parameters_of
 from hydraulic_interfaces.plant_backend import PlantBackend
 
@@ -34,7 +33,6 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     parser = command_line.parser(description, parameters_of(backend))
     parser.add_argument("--autostart", action="store_true", help="configure and activate at start")
     options = command_line.start(parser, argv)
-    know_log_callers()  # before the node is made: with autostart the plant loop runs when that returns
     overrides = [Parameter("autostart", value=True)] if options.autostart else []
     try:
         node = PlantNode(backend, parameter_overrides=overrides)

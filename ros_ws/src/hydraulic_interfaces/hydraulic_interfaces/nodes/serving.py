@@ -15,7 +15,6 @@ from rclpy.node import Node
 
 from hydraulic_interfaces.nodes import command_line
 from hydraulic_interfaces.nodes.exit_guard import exit_guard
-from hydraulic_interfaces.nodes.log_callers import know_log_callers
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 
 WATCH_PERIOD_S = 0.05
@@ -50,7 +49,6 @@ def serve(
 ) -> int:
     """Run the node (`Served`) until it is over; its exit code, or 2 for what it refuses when it is made."""
     command_line.start(command_line.parser(description, parameters), argv)
-    know_log_callers()
     try:
         node = make_node()
     except (ParameterException, ValueError) as error:

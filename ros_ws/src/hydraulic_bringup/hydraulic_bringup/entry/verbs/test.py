@@ -18,6 +18,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
@@ -71,19 +72,16 @@ def _all(pytest: list[str], root: Path, variables: Mapping[str, str]) -> tuple[i
     computing = [[*folders, f"--ignore-glob={NODES}"] for folders in COMPUTING]
     streams: list[Stream] = []
 
-    def start(selection: Sequence[str], nice: int = 0) -> None:
+    def start(selection: Sequence[str], nice: int = 0) -> Stream:
         command = [*pytest, *selection, "-p", "no:cacheprovider"]
         streams.append(Stream(command, root, variables, " ".join(selection), nice))
+        return streams[-1]
 
     with ending(streams):
-        for selection in computing:
-            start(selection, NICE)
+        beside = [start(selection, NICE) for selection in computing]
         if machine:
-            start(machine)
-            streams[-1].show()
-        for half in halves:
-            start(half)
-        for stream in (*streams[-len(halves) :], *streams[: len(computing)]):
+            start(machine).show()
+        for stream in (*[start(half) for half in halves], *beside):
             stream.show()
     closing = summed([stream.closing for stream in streams], time.monotonic() - begun)
     bad = [stream for stream in streams if stream.code]
@@ -133,7 +131,7 @@ class Stream:
             env={**variables, **size},
             stdout=self._file,
             stderr=subprocess.STDOUT,
-            preexec_fn=lambda: _give_way(nice),
+            preexec_fn=partial(os.nice, nice),
         )
 
     @property
@@ -187,7 +185,3 @@ def ending(streams: Sequence[Stream]) -> Iterator[None]:
     finally:
         for stream in streams:
             stream.close()
-
-
-def _give_way(nice: int) -> None:
-    os.nice(nice)
