@@ -42,7 +42,11 @@ case "$*" in
     done ;;
 *"-m ruff"*) [ ! -e "$BREAK" ] || { echo "E501 line too long"; exit 1; } ;;
 *"-m mypy"*) echo "Success: no issues found" ;;
-*"-m pytest tests/$LEAKS"*) echo "test_seal.py F"; echo "=== 1 failed, 1 passed, 2 errors in 0.02s ==="; exit 1 ;;
+*"-m pytest tests/$SEEPS"*"--last-failed"*) echo "=== 3 passed, 7 deselected in 0.02s ===" ;;
+*"-m pytest tests/$LEAKS"*|*"-m pytest tests/$SEEPS"*)
+    echo "test_seal.py F"
+    echo "=== 1 failed, 1 passed, 2 errors in 0.02s ==="
+    exit 1 ;;
 *"-m pytest tests/$BURSTS"*) echo "Segmentation fault"; exit 139 ;;
 *"-m pytest"*) echo "collected 2 items"; echo "=== 2 passed, 1 warning in 0.01s ===" ;;
 esac
@@ -63,6 +67,7 @@ class FakeCheckout:
             "CALLS": str(self.calls_file),
             "BREAK": str(self.broken),
             "LEAKS": "nowhere",
+            "SEEPS": "nowhere",
             "BURSTS": "nowhere",
         }
         root.mkdir(exist_ok=True)
@@ -397,23 +402,41 @@ def with_tests(built: FakeCheckout) -> FakeCheckout:
 def test_all_tests_run_once_and_the_closing_line_sums_up(with_tests: FakeCheckout) -> None:
     answer = with_tests.bench("test")
     assert answer.returncode == 0, answer.stderr
-    common = " -p no:cacheprovider"
-    assert sorted(call for call in with_tests.calls() if "pytest" in call) == [
-        f"-m pytest tests/hidden_effects --ignore-glob=*_node.py{common}",
-        f"-m pytest tests/pump tests/sim/test_pump_node.py{common}",
-        f"-m pytest tests/sim tests/sysid --ignore-glob=*_node.py{common}",
-        f"-m pytest tests/system --ignore=tests/system/test_vcan.py{common}",
-        f"-m pytest tests/system/test_vcan.py{common}",
+    calls = [call for call in with_tests.calls() if "pytest" in call]
+    assert sorted(call.partition(" -o cache_dir=")[0] for call in calls) == [
+        "-m pytest tests/hidden_effects --ignore-glob=*_node.py -p no:cacheprovider",
+        "-m pytest tests/pump tests/sim/test_pump_node.py",
+        "-m pytest tests/sim tests/sysid --ignore-glob=*_node.py -p no:cacheprovider",
+        "-m pytest tests/system --ignore=tests/system/test_vcan.py",
+        "-m pytest tests/system/test_vcan.py",
     ]
     assert answer.stdout.count("collected 2 items") == 5
     assert answer.stdout.splitlines()[-1].startswith("=== 10 passed, 5 warnings in ")
 
 
-@pytest.mark.parametrize("folder", ["system/test_vcan.py", "system --ignore", "pump", "hidden_effects"])
+KEEP_TIME = ["system/test_vcan.py", "system --ignore", "pump"]
+
+
+@pytest.mark.parametrize("folder", KEEP_TIME)
+def test_what_keeps_time_and_fails_is_run_again_alone(with_tests: FakeCheckout, folder: str) -> None:
+    answer = with_tests.bench("test", SEEPS=folder)
+    calls = [call for call in with_tests.calls() if f"pytest tests/{folder}" in call]
+    assert [" --last-failed" in call for call in calls] == [False, True]
+    assert calls[1] == f"{calls[0]} --last-failed", "it knows from the first what failed"
+    assert answer.returncode == 0
+    assert "test_seal.py F" in answer.stdout
+    assert answer.stdout.splitlines()[-1].startswith("=== 12 passed, 7 deselected, 3 repeated, 4 warnings in ")
+
+
+@pytest.mark.parametrize("folder", [*KEEP_TIME, "hidden_effects"])
 def test_whichever_run_fails_fails_the_test(with_tests: FakeCheckout, folder: str) -> None:
     leaks = with_tests.bench("test", LEAKS=folder)
     assert leaks.returncode == 1
-    assert leaks.stdout.splitlines()[-1].startswith("=== 1 failed, 9 passed, 4 warnings, 2 errors in ")
+    counts = leaks.stdout.splitlines()[-1].partition(" in ")[0]
+    if folder in KEEP_TIME:  # again, and in vain
+        assert counts == "=== 1 failed, 10 passed, 3 repeated, 4 warnings, 2 errors"
+    else:
+        assert counts == "=== 1 failed, 9 passed, 4 warnings, 2 errors"
     assert "test_seal.py F" in leaks.stdout
     bursts = with_tests.bench("test", BURSTS=folder)
     assert bursts.returncode == 139

@@ -146,13 +146,34 @@ def runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[list[str]
     return play  # type: ignore[return-value]
 
 
+class Plant:
+    """What a client asks of the plant; `fault` is the answer to reset, `refusal` that to enable."""
+
+    def __init__(self, refusal: str = "", fault: str = "") -> None:
+        self.asked: list[str] = []
+        self._refusal, self._fault = refusal, fault
+
+    def reset(self, patience: float) -> str:
+        self.asked.append("reset")
+        return "" if "configure" in self.asked else self._fault
+
+    def change_state(self, label: str, patience: float, meanwhile: Any) -> bool:
+        self.asked.append(label)
+        return True
+
+    def enable(self, patience: float) -> str:
+        self.asked.append("enable")
+        return self._refusal
+
+
 def test_an_aborted_experiment_is_run_again_and_its_bag_kept_aside(runs: Any, tmp_path: Path) -> None:
     runs(["no state for 0.6 s", ""])
-    said = Said()
-    bag = online._experiment(None, None, online.Experiment("chirp", Path("p.yaml")), tmp_path, said, 2)  # type: ignore[arg-type]
+    said, plant = Said(), Plant()
+    bag = online._experiment(None, plant, online.Experiment("chirp", Path("p.yaml")), tmp_path, said, 2)  # type: ignore[arg-type]
     assert bag == tmp_path / "chirp"
     assert bag.is_dir()
     assert (tmp_path / "chirp.aborted").is_dir()
+    assert plant.asked == ["reset", "enable"], "what aborted it may be a fault that is latched"
     assert len(said.texts) == 1
     assert "no state for 0.6 s" in said.texts[0]
 
@@ -161,8 +182,28 @@ def test_an_aborted_experiment_is_run_again_and_its_bag_kept_aside(runs: Any, tm
 def test_the_last_attempt_that_is_aborted_fails_the_step(runs: Any, tmp_path: Path, attempts: int) -> None:
     folders = runs(["travel", "travel"])
     with pytest.raises(DemoError, match="chirp: excite and record: aborted: travel"):
-        online._experiment(None, None, online.Experiment("chirp", Path("p")), tmp_path, Said(), attempts)  # type: ignore[arg-type]
+        online._experiment(None, Plant(), online.Experiment("chirp", Path("p")), tmp_path, Said(), attempts)  # type: ignore[arg-type]
     assert len(folders) == attempts
+
+
+def test_a_fault_that_stays_takes_the_plant_through_its_whole_life(runs: Any, tmp_path: Path) -> None:
+    runs(["not started: waited", ""])
+    plant = Plant(fault="configure it anew")
+    online._experiment(None, plant, online.Experiment("chirp", Path("p.yaml")), tmp_path, Said(), 2)  # type: ignore[arg-type]
+    assert plant.asked == ["reset", "deactivate", "cleanup", "configure", "activate", "reset", "enable"]
+
+
+def test_a_plant_that_stays_at_fault_fails_the_step(runs: Any, tmp_path: Path) -> None:
+    runs(["valve fault", ""])
+    with pytest.raises(DemoError, match="chirp: run it once more: the plant was not enabled again: pressure lost"):
+        online._experiment(
+            None,  # type: ignore[arg-type]
+            Plant("pressure lost"),
+            online.Experiment("chirp", Path("p.yaml")),
+            tmp_path,
+            Said(),
+            2,
+        )
 
 
 def test_over_can_the_demo_brings_its_own_devices_and_touches_no_real_bus() -> None:

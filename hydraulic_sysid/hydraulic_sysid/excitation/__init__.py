@@ -5,10 +5,11 @@ from hydraulic_sysid.excitation.errors import ExcitationError, PlanError, Playba
 from hydraulic_sysid.excitation.plan import Plan, load_plan, save_plan, shipped_plans
 from hydraulic_sysid.excitation.plant_report import PlantReport
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
-from hydraulic_sysid.excitation.session import Session
+from hydraulic_sysid.excitation.session import NOT_STARTED, Session
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds
 
 __all__ = [
+    "NOT_STARTED",
     "AppliedDriveCheck",
     "ExcitationError",
     "ExcitationRun",

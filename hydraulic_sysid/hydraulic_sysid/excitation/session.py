@@ -14,6 +14,9 @@ from hydraulic_sysid.excitation.plan import Plan
 from hydraulic_sysid.excitation.plant_report import PlantReport
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
 
+NOT_STARTED = "not started"
+"""What is said of a plan that waited in vain for the plant to be ready for it."""
+
 
 class Session:
     """Arms plans, starts each when the plant is ready for it, plays it, and reports how it ended.

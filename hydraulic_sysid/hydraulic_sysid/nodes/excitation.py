@@ -22,7 +22,7 @@ from hydraulic_interfaces.conversions import CommandEncoder, MessageError, sampl
 from hydraulic_interfaces.nodes.parameters import ParameterTable
 from hydraulic_interfaces.nodes.serving import ServedNode, serve
 from hydraulic_interfaces.qos import profile
-from hydraulic_sysid.excitation import ExcitationError, Phase, Plan, Session, load_plan
+from hydraulic_sysid.excitation import NOT_STARTED, ExcitationError, Phase, Plan, Session, load_plan
 from hydraulic_sysid.nodes._bandwidth_probe import BandwidthProbe
 from hydraulic_sysid.nodes._excitation_health import health
 from hydraulic_sysid.nodes._excitation_parameters import PARAMETERS
@@ -68,7 +68,7 @@ class ExcitationNode(ServedNode):
             waiting_for = self._session.obstacle(now) if self._session.armed else ""
             self._health.publish(health(self._session, waiting_for, self.get_clock().now().nanoseconds))
             if self._session.armed and now > self._patience_ends:
-                self.get_logger().error(f"not started: waited too long for {waiting_for}")
+                self.get_logger().error(f"{NOT_STARTED}: waited too long for {waiting_for}")
                 self._session.stop("")
                 self.exit_code, self.over = 1, self._table["exit_when_done"]
 

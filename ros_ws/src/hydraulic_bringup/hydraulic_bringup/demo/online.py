@@ -15,7 +15,7 @@ from typing import Protocol
 
 from hydraulic_bringup.verbs.virtual_bench import READY
 from hydraulic_interfaces.contract import ABORTED
-from hydraulic_sysid.excitation import load_plan
+from hydraulic_sysid.excitation import NOT_STARTED, load_plan
 
 from .errors import DemoError
 from .processes import Child, Crew
@@ -145,9 +145,11 @@ def _start_devices(crew: Crew, model: Path, steps: Steps) -> dict[str, object]:
 
 
 def _experiment(crew: Crew, client, experiment: Experiment, out: Path, steps: Steps, attempts: int) -> Path:
-    """Its bag; an experiment that the excitation aborts is run again while attempts are left."""
+    """Its bag; an experiment that does not start or is aborted is run again while attempts are left."""
     bag = (out / experiment.name).absolute()
     for attempt in range(1, attempts + 1):
+        if attempt > 1:
+            _release(client, experiment, steps)
         reason = _excite_and_record(crew, client, experiment, bag, steps, attempt)
         if not reason:
             return bag
@@ -158,8 +160,20 @@ def _experiment(crew: Crew, client, experiment: Experiment, out: Path, steps: St
     raise DemoError(f"{experiment.name}: excite and record", f"aborted: {reason}", hint)
 
 
+def _release(client, experiment: Experiment, steps: Steps) -> None:
+    """The plant enabled again, if a fault or a stop has latched it at 0 V. Raises `DemoError`."""
+    problem = client.reset(_STEP_S)
+    if problem:  # not all that a device reports is gone with a reset
+        for transition in ("deactivate", "cleanup", "configure", "activate"):
+            client.change_state(transition, _STEP_S, steps.tick)
+        problem = client.reset(_STEP_S)
+    problem = problem or client.enable(_STEP_S)
+    if problem:
+        raise DemoError(f"{experiment.name}: run it once more", f"the plant was not enabled again: {problem}")
+
+
 def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, steps: Steps, attempt: int) -> str:
-    """Record one run into ``bag``; empty, or why the excitation aborted it. Raises `DemoError`."""
+    """Record one run into ``bag``; empty, or why the excitation aborted or did not start it. Raises `DemoError`."""
     seconds = load_plan(str(experiment.plan)).total_time
     suffix = f"{experiment.name}_{attempt}" if attempt > 1 else experiment.name
     step = f"{experiment.name}: start the recorder"
@@ -187,8 +201,12 @@ def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, st
         return ""
     ends = _aborts(client, begun_ns)
     if not ends:
-        excitation.may_end = ()
-        crew.check(step)
+        words = excitation.tail()
+        if NOT_STARTED not in words:
+            excitation.may_end = ()
+            crew.check(step)
+        recorder.stop()
+        return words[words.rindex(NOT_STARTED) :].splitlines()[0]
     crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
     return str(ends[-1]["reason"])
 

@@ -13,7 +13,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 
 from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service, topic
 from hydraulic_interfaces.nodes.exit_guard import exit_guard
@@ -93,7 +93,14 @@ class GraphClient:
 
     def enable(self, patience: float) -> str:
         """Let commands through; empty, or why not."""
-        answer = self._call(SetBool, service("enable"), SetBool.Request(data=True), patience)
+        return self._ask(SetBool, "enable", SetBool.Request(data=True), patience)
+
+    def reset(self, patience: float) -> str:
+        """Release a latched stop, if there is one; the plant then stays disabled. Empty, or why not."""
+        return self._ask(Trigger, "reset", Trigger.Request(), patience)
+
+    def _ask(self, kind: Any, name: str, request: Any, patience: float) -> str:
+        answer = self._call(kind, service(name), request, patience)
         if answer is None:
             return f"no answer within {patience:g} s"
         return "" if answer.success else str(answer.message)

@@ -1,7 +1,8 @@
 """test [PYTEST ARG …]: build, ruff, mypy and all tests; with arguments only pytest on those.
 
-All tests run in several pytest processes side by side, whose output is shown one after the other. The last line printed
-is pytest's closing line, or the sum of those. Exit code 0 only if everything passed.
+All tests run in several pytest processes side by side, whose output is shown one after the other. Tests that keep time
+and fail there are run once more with the machine to themselves, and said to be so. The last line printed is pytest's
+closing line, or the sum of those. Exit code 0 only if everything passed.
 """
 
 from __future__ import annotations
@@ -30,9 +31,11 @@ NODES = "*_node.py"
 MACHINE = "tests/system/test_vcan.py"  # where this kernel has no vcan, a virtual machine that takes all processors
 FIRST = ("tests/system", "tests/contract")  # half of the waiting; any other folder goes to the rest
 NICE = 15
+NO_MEMORY = ("-p", "no:cacheprovider")
+FAILED_TESTS = 1  # pytest's exit code; others mean that it was not able to run them
 INTERRUPT_S = 15.0  # for pytest to end its node processes and to sum up
 POLL_S = 0.1
-COUNT = re.compile(r"(\d+) (passed|failed|errors?|skipped|xfailed|xpassed|deselected|warnings?)\b")
+COUNT = re.compile(r"(\d+) (passed|failed|errors?|skipped|xfailed|xpassed|deselected|repeated|warnings?)\b")
 
 
 def run(bench: Bench, arguments: list[str]) -> int:
@@ -71,20 +74,26 @@ def _all(pytest: list[str], root: Path, variables: Mapping[str, str]) -> tuple[i
     # These need no more than what the others leave of the processors.
     computing = [[*folders, f"--ignore-glob={NODES}"] for folders in COMPUTING]
     streams: list[Stream] = []
+    with tempfile.TemporaryDirectory(prefix="bench_test_") as memory, ending(streams):
 
-    def start(selection: Sequence[str], nice: int = 0) -> Stream:
-        command = [*pytest, *selection, "-p", "no:cacheprovider"]
-        streams.append(Stream(command, root, variables, " ".join(selection), nice))
-        return streams[-1]
+        def start(selection: Sequence[str], options: Sequence[str], nice: int = 0) -> Stream:
+            streams.append(Stream([*pytest, *selection, *options], root, variables, " ".join(selection), nice))
+            return streams[-1]
 
-    with ending(streams):
-        beside = [start(selection, NICE) for selection in computing]
+        def remember() -> list[str]:
+            return ["-o", f"cache_dir={memory}/{len(streams)}"]
+
+        beside = [start(selection, NO_MEMORY, NICE) for selection in computing]
         if machine:
-            start(machine).show()
-        for stream in (*[start(half) for half in halves], *beside):
+            start(machine, remember()).show()
+        for stream in (*[start(half, remember()) for half in halves], *beside):
             stream.show()
-    closing = summed([stream.closing for stream in streams], time.monotonic() - begun)
-    bad = [stream for stream in streams if stream.code]
+        for stream in [stream for stream in streams if stream not in beside and stream.code == FAILED_TESTS]:
+            stream.superseded = True
+            streams.append(Stream([*stream.command, "--last-failed"], root, variables, f"{stream.title}: again, alone"))
+            streams[-1].show()
+    closing = summed([stream.counted for stream in streams], time.monotonic() - begun)
+    bad = [stream for stream in streams if stream.code and not stream.superseded]
     if bad:
         print("Failed, see above:", *(stream.closing for stream in bad), sep="\n  ")
     print(closing, flush=True)
@@ -109,7 +118,7 @@ def summed(closings: Sequence[str], seconds: float) -> str:
         counts.update({"errors": 1} if not found else {})
         for number, what in found:
             counts[{"error": "errors", "warning": "warnings"}.get(what, what)] += int(number)
-    order = ("failed", "passed", "skipped", "deselected", "xfailed", "xpassed", "warnings", "errors")
+    order = ("failed", "passed", "skipped", "deselected", "xfailed", "xpassed", "repeated", "warnings", "errors")
     told = ", ".join(f"{counts[what]} {what}" for what in order if counts[what])
     return f"=== {told} in {seconds:.2f}s ({int(seconds) // 60} min {int(seconds) % 60} s) ==="
 
@@ -123,7 +132,8 @@ class Stream:
         size = {"COLUMNS": str(shutil.get_terminal_size().columns)}
         colour = ["--color=yes"] if sys.stdout.isatty() else []
         self.closing = ""
-        self._title = title
+        self.superseded = False  # its failures have been run again
+        self.command, self.title = command, title
         self._file = tempfile.NamedTemporaryFile(prefix="bench_test_")  # noqa: SIM115 - until `close`
         self._process = subprocess.Popen(
             [*command, *colour],
@@ -139,9 +149,14 @@ class Stream:
         """Exit code; it has to have ended."""
         return self._process.returncode
 
+    @property
+    def counted(self) -> str:
+        """Its closing line for the sum: what another stream has run again is counted there."""
+        return re.sub(r"\b(\d+) (failed|errors?)\b", r"\1 repeated", self.closing) if self.superseded else self.closing
+
     def show(self) -> str:
         """Print what it has written and writes, until it ends; its last line."""
-        print(f"== pytest {self._title}".rstrip(), flush=True)
+        print(f"== pytest {self.title}".rstrip(), flush=True)
         decoder = codecs.getincrementaldecoder("utf-8")("replace")
         tail = ""
         with open(self._file.name, "rb") as source:
