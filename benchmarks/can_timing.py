@@ -4,14 +4,16 @@
 
 Late is a cycle whose SYNC was off its instant by more than a quarter of the period, whose frames were not all there in
 time, or that had to be left out. A bare loop of python-can then does the same between two processes (drive and SYNC
-out, five frames back), so that the figures of the node stand beside those of library and machine. On SocketCAN the
-kernel sends the node's SYNC; the bare loop always sends its own.
+out, five frames back), and a bare timer waits for the same instants and does nothing, so that the figures of the node
+stand beside those of library and machine. All three keep idle processors awake. On SocketCAN the kernel sends the
+node's SYNC; the bare loop always sends its own. Two minutes and a half of a quiet machine at the default settings.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import random
 import subprocess
@@ -25,7 +27,7 @@ import can
 
 from hydraulic_can_driver.can_bus import hears_itself, open_can
 from hydraulic_can_driver.supervision import LATE
-from hydraulic_interfaces.pacing import Pacer, request_realtime
+from hydraulic_interfaces.pacing import Pacer, Wakefulness, request_realtime
 
 SYNC, DRIVE, ANSWERS = 0x80, 0x510, (0x490, 0x1A0, 0x1B0, 0x1B1, 0x1B2)
 WITHIN = 0.8
@@ -188,8 +190,19 @@ def bare(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def timer(options: argparse.Namespace) -> dict[str, Any]:
+    """Waiting alone: what scheduler and machine leave to anybody."""
+    request_realtime(20)
+    wait, period = Pacer().wait, round(1e9 / options.rate)
+    origin = time.monotonic_ns() + period
+    count = round(options.seconds * options.rate)
+    behind = [wait(origin + number * period) - origin - number * period for number in range(count)]
+    late = sum(ns > LATE * period for ns in behind)
+    return {"cycles": count, "late_percent": 100.0 * late / count, "behind_ms": quantiles([ns * 1e-6 for ns in behind])}
+
+
 def main() -> None:
-    """Run both and print the figures."""
+    """Run all and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--rate", type=int, default=500)
@@ -200,7 +213,13 @@ def main() -> None:
     if options.role == "answer":
         answer(options)
         return
-    figures = {"node": node(options), "bare python-can": bare(options)}
+    figures = {"node": node(options)}
+    awake = Wakefulness()
+    figures |= {"bare python-can": bare(options), "bare timer": timer(options)}
+    awake.release()
+    for peer in ("bare python-can", "bare timer"):
+        late = figures[peer]["late_percent"]
+        figures["node"][f"late / {peer}"] = figures["node"]["late_percent"] / late if late else math.inf
     print(json.dumps(figures, indent=2))
 
 

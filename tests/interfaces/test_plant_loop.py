@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -84,6 +85,22 @@ def test_stamps_lie_on_the_grid_and_the_end_is_at_zero(wait_until: Any) -> None:
     assert backend.calls == ["deactivate"]
     assert loop.error is None and loop.drive == 0.0 and loop.last_stamp_ns == stamps[-1]
     assert gc.isenabled()
+
+
+def test_processors_are_kept_awake_only_while_a_loop_with_priority_runs(wait_until: Any) -> None:
+    place = "/dev/cpu_dma_latency"
+    if not os.access(place, os.W_OK):
+        pytest.skip(f"{place} may not be written")
+
+    def awake() -> bool:
+        files = [f"/proc/self/fd/{name}" for name in os.listdir("/proc/self/fd")]
+        return any(os.path.realpath(file) == place for file in files)
+
+    for priority in (0, 20):
+        seen: list[bool] = []
+        run(Scripted(lambda k, seen=seen: seen.append(awake())), 3, wait_until, priority=priority)  # type: ignore[misc]
+        assert set(seen) == {priority > 0}
+        assert not awake()
 
 
 def test_a_run_begins_without_the_drive_that_the_last_one_ended_with(wait_until: Any) -> None:

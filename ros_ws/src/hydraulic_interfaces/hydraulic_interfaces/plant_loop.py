@@ -14,7 +14,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from hydraulic_interfaces.command_gate import CommandGate
-from hydraulic_interfaces.pacing import Pacer, release_realtime_for_all, request_realtime, request_realtime_for_all
+from hydraulic_interfaces.pacing import (
+    Pacer,
+    Wakefulness,
+    release_realtime_for_all,
+    request_realtime,
+    request_realtime_for_all,
+)
 from hydraulic_interfaces.plant_backend import PlantBackend
 from hydraulic_interfaces.rate_monitor import RateMonitor
 from hydraulic_interfaces.samples import PlantSample
@@ -85,6 +91,7 @@ class PlantLoop:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plant_loop", daemon=True)
         self._switch_interval = sys.getswitchinterval()
+        self._wakefulness: Wakefulness | None = None
         self._wall_offset_ns = 0
 
     def start(self) -> None:
@@ -98,6 +105,8 @@ class PlantLoop:
         gc.freeze()
         gc.disable()
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
+        if self._timing.priority > 0:
+            self._wakefulness = Wakefulness()
         if self._timing.priority > 1:
             request_realtime_for_all(self._timing.priority - 1)
         self._thread.start()
@@ -108,6 +117,8 @@ class PlantLoop:
         ended = self._ended.wait(timeout)
         if self._timing.priority > 1:
             release_realtime_for_all()
+        if self._wakefulness:
+            self._wakefulness.release()
         sys.setswitchinterval(self._switch_interval)
         gc.enable()
         gc.unfreeze()
