@@ -7,6 +7,7 @@ the others its shape, which is tried at a few values around the library's defaul
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ SHAPES = (1.0, 0.3, 3.0, 8.0)  # of the default
 SIZES = (1.0, 0.25)  # of the default, measured from the null value
 MOST_SHAPES = 7
 ANGLE = "rad"
+QUARTERS = tuple(0.5 * math.pi * i for i in range(4))  # angles that are tried
 
 
 @dataclass(frozen=True)
@@ -77,13 +79,17 @@ def probes(effect: Effect, hints: Hints) -> Iterator[list[Probe]]:
                 yield [Probe({key: hints.resolution}, key, p.null)]
         return
     lines = hints.lines
-    shape = [p for p in effect.parameters if p.null is None]
+    shape = [p for p in effect.parameters if p.null is None and p.unit != ANGLE]
+    angles = [p for p in effect.parameters if p.null is None and p.unit == ANGLE]
     moved = [p for p in effect.parameters if p.null is not None and p.free]
     grids = [_grid(p, lines) for p in shape]
     first = tuple(g[0] for g in grids)
     tried = [first] + [c for c in itertools.product(*grids) if c != first and _changes(c, first) == 1]
-    for values in tried[: MOST_SHAPES + len(lines)]:
-        given = {f"{effect.name}.{p.name}": v for p, v in zip(shape, values, strict=True)}
+    # An angle says nothing without the right frequency, nor the other way round: all of one with all of the other.
+    for values, turned in itertools.product(
+        tried[: MOST_SHAPES + len(lines)], itertools.product(QUARTERS, repeat=len(angles))
+    ):
+        given = {f"{effect.name}.{p.name}": v for p, v in zip([*shape, *angles], [*values, *turned], strict=True)}
         for size in SIZES if values == first else SIZES[:1]:
             yield [_probe(effect, given, p, size) for p in moved]
 
@@ -108,8 +114,6 @@ def _grid(p: Parameter, lines: tuple[float, ...]) -> list[float]:
     low, high = p.bounds
     if not p.free:
         return [p.default]
-    if p.unit == ANGLE:
-        return [0.0, 1.5707963267948966]
     values = [p.default * f for f in SHAPES]
     if p.unit == "Hz":
         values += list(lines)

@@ -19,7 +19,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.calibrate.estimate import scale
 from hydraulic_sysid.calibrate.steps import bounded_step
 
-from .anchor import Anchor, inner, project, within
+from .anchor import Anchor, inner, keys_of, project, within
 from .candidates import between
 
 Array = NDArray[np.float64]
@@ -30,6 +30,7 @@ _FLAT = 2e-4  # relative gain of a step that ends the refit
 MOST_STEPS = 10
 _SHARES = (1.0, 0.5, 0.2, 0.05)  # of the predicted size, to start from
 _RESTS = 2  # times that starts are moved at the end
+_ROUNDED = 6  # the same where what is measured is rounded, and the sensitivities only point the way
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,14 @@ def refit(anchor: Anchor, model: Model, start: Mapping[str, float], most_steps: 
     costs = fit.settled(now)
     done = model.with_values(within(model, now.values), source="fitted")
     return Refit(done, costs, *fit.sums(costs), tuple(fit.own))
+
+
+def as_it_is(anchor: Anchor, model: Model) -> Refit:
+    """``model``, which has the anchor's effects and more, with the values it has; only starts of pieces are moved."""
+    fit = _Fit(anchor, model, {})
+    now = fit._at({k: model.value(k) for k in keys_of(model)}, [s.copy() for s in anchor.shooting.starts])
+    costs = anchor.costs if now is None else fit.settled(now, _ROUNDED)
+    return Refit(model, costs, *fit.sums(costs), ())
 
 
 @dataclass(frozen=True)
@@ -149,11 +158,11 @@ class _Fit:
             damping *= 8.0
         return None, damping
 
-    def settled(self, now: _Point) -> list[Array]:
+    def settled(self, now: _Point, rests: int = _RESTS) -> list[Array]:
         """Sums of squares (S,) of the pieces per record, each from the best of a few starts."""
         costs = [np.sum(r**2, axis=1) for r in now.residual]
         starts, raw = now.starts, now.raw
-        for _ in range(_RESTS):
+        for _ in range(rests):
             there = self._at(now.values, self._rested(starts, raw))
             if there is None:
                 break

@@ -15,9 +15,9 @@ from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sysid.calibrate.estimate import Settings
 
-from .anchor import Anchor, anchor, fitted
-from .candidates import Hints, candidates
-from .chord import Refit, refit
+from .anchor import Anchor, anchor, fitted, keys_of
+from .candidates import Hints, candidates, observed
+from .chord import Refit, as_it_is, refit
 from .levels import Level, level, material, repaired
 from .pieces import Split
 from .screen import Prospect, screen
@@ -53,16 +53,17 @@ class Trial:
 
 @dataclass(frozen=True)
 class Stage:
-    """A model with some effects, fitted, and the candidates tried on top of it, best first."""
+    """A model with some effects, fitted, and the candidates tried on top of it, best first.
 
+    ``anchor`` has no effects that records show by themselves: such as rounding have no derivative, and `model` and
+    ``level`` are with them, the parameters as they are without.
+    """
+
+    model: Model
     anchor: Anchor
     level: Level
     trials: list[Trial] = field(default_factory=list)
     prospects: list[Prospect] = field(default_factory=list)
-
-    @property
-    def model(self) -> Model:
-        return self.anchor.model
 
 
 @dataclass(frozen=True)
@@ -84,13 +85,17 @@ class Search:
 
     def stage(self, model: Model, settings: Settings | None = None) -> Stage:
         """Fit a model and linearise it."""
-        there = anchor(fitted(model, self.split, settings or self.settings), self.split)
-        return Stage(there, level(self.split, there))
+        smooth = model
+        for name in _observed(model):
+            smooth = smooth.without_effect(name)
+        there = anchor(fitted(smooth, self.split, settings or self.settings), self.split)
+        whole = _with_values(model, there.model)
+        return Stage(whole, there, level(self.split, as_it_is(there, whole) if _observed(model) else there))
 
     def explore(self, base: Stage, exclude: Sequence[str] = (), most: int = MOST_REFITS) -> Stage:
         """Screen all candidates on a stage and refit the best."""
         point = base.anchor
-        found = screen(point, [e for e in candidates(point.model) if e.name not in exclude], self._hints(point))
+        found = screen(point, [e for e in candidates(base.model) if e.name not in exclude], self._hints(point))
         if not found:
             return base
         floor = max(PROMISING * found[0].gain, 0.2 * base.level.least)
@@ -98,6 +103,8 @@ class Search:
         for prospect in [p for p in found if p.gain > floor][:most]:
             self.say(f"refitting with {prospect.effect.name}")
             done = refit(point, point.model.with_effect(prospect.effect.name), prospect.start)
+            if _observed(base.model):
+                done = as_it_is(point, _with_values(base.model.with_effect(prospect.effect.name), done.model))
             trials.append(Trial(prospect.effect.name, prospect.gain, done, level(self.split, done)))
         trials.sort(key=lambda t: t.level.total)
         return replace(base, anchor=point.slim(), trials=trials, prospects=found)
@@ -211,6 +218,16 @@ class Search:
             steps.append((name, self.stage(model).level))
         added[:] = order
         return steps
+
+
+def _observed(model: Model) -> list[str]:
+    """Effects of a model whose size the records show by themselves."""
+    return [name for name in model.effects if observed(model.library[name])]
+
+
+def _with_values(model: Model, fitted: Model) -> Model:
+    """The model with what was fitted in one that lacks some of its effects."""
+    return model.with_values({k: fitted.value(k) for k in keys_of(fitted)}, source="fitted")
 
 
 def _worth(base: Level, before: Level, after: Level, part: float) -> bool:
