@@ -128,8 +128,13 @@ def fit_pieces(
 
 
 def scale(model: Model, key: str) -> float:
-    """The size of a parameter: of its value, or of the library's default where that is larger."""
-    return max(abs(model.value(key)), abs(model.parameter(key).default), 1e-12)
+    """The size of a parameter: of its value, or of the library's default where that is larger.
+
+    Where both are 0, as an angle may be, a hundredth of its range.
+    """
+    parameter = model.parameter(key)
+    low, high = parameter.bounds
+    return max(abs(model.value(key)), abs(parameter.default)) or 0.01 * (high - low)
 
 
 def evaluate(model: Model, records: Sequence[Record], settings: Settings | None = None) -> Fit:
