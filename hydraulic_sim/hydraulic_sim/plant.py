@@ -192,8 +192,8 @@ class Plant:
 
     @property
     def has_inner_states(self) -> bool:
-        """Whether an effect that is on has states of its own, which no sensor sees."""
-        return any(effect.states for effect in self._active)
+        """Whether an effect that is on has states of its own, which no sensor sees, or never forgets a drive."""
+        return any(e.states or (e.slot == "command" and e.memory and e.reach is None) for e in self._active)
 
     def track(self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike) -> tuple[Array, Array]:
         """What the states that no sensor sees have become at each start, the others led by what was seen.

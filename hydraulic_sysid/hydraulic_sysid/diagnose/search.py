@@ -16,7 +16,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.calibrate.estimate import Settings
 
 from .anchor import Anchor, anchor, fitted, keys_of
-from .candidates import Hints, candidates, observed
+from .candidates import Hints, candidates, observed, subsystem
 from .chord import Refit, as_it_is, refit
 from .levels import Level, level, material, repaired
 from .pieces import Split
@@ -30,6 +30,8 @@ NEAR = 0.93  # of the best gain, from which a refit is finished
 MOST_EFFECTS = 3
 FURTHER = 0.25  # of what is left, which a further effect must repair, unless it repairs a good part of all
 NEEDED = 0.02  # of all that was repaired, which an effect must repair beside the others to stay
+LAW = 0.0025  # of all that was repaired: what a law that is right to a twentieth leaves for others of its subsystem …
+ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.1  # of what an effect repairs, by which a quick refit in its place may lie above, to be finished
 SETTLED = 0.006  # mean square beyond the noise below which nothing more is looked for
 MOST_SWAPS = 3
@@ -38,7 +40,7 @@ PROMISED = 0.5  # of what an effect must repair, which its quick refit must show
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended
 
 Say = Callable[[str], None]
-Enough = Callable[[Level, float], bool]
+Enough = Callable[[str, Level, float], bool]
 
 
 @dataclass(frozen=True)
@@ -112,9 +114,9 @@ class Search:
     def finish(self, base: Stage, enough: Enough) -> Stage | None:
         """The best of the trials, fitted to the end; None where none is worth it.
 
-        ``enough(level, part)``: whether a level is a part of the way to being worth it.
+        ``enough(name, level, part)``: whether an effect's level is a part of the way to being worth it.
         """
-        worth = [t for t in base.trials if material(base.level, t.level) and enough(t.level, PROMISED)]
+        worth = [t for t in base.trials if material(base.level, t.level) and enough(t.name, t.level, PROMISED)]
         if not worth:
             return None
         top = base.level.total - worth[0].level.total
@@ -125,7 +127,7 @@ class Search:
                 found.append(self.stage(trial.refit.model, replace(self.settings, most_steps=LAST_STEPS)))
             except SimulationError:
                 continue
-        found = [f for f in found if material(base.level, f.level) and enough(f.level, 1.0)]
+        found = [f for f in found if material(base.level, f.level) and enough(_new(f, base), f.level, 1.0)]
         return min(found, key=lambda f: f.level.total, default=None)
 
     def run(self, model: Model) -> Found:
@@ -135,7 +137,7 @@ class Search:
         added: list[str] = []
         path = [stage]
         while len(added) < MOST_EFFECTS:
-            better = self.finish(path[-1], partial(_worth, base.level, path[-1].level) if added else _anything)
+            better = self.finish(path[-1], partial(_worth, base, path[-1], added) if added else _anything)
             if better is None:
                 break
             added.append(_new(better, path[-1]))
@@ -156,10 +158,11 @@ class Search:
     ) -> tuple[Stage, list[str], dict[str, Stage]]:
         """Leave out what the others make superfluous; put in an effect's place what fits better there.
 
-        ``rivals``: of the effect that came last, known already.
+        ``rivals``: of the effect that came last, known already; it, too, may be superfluous, where it was only what
+        brought the fit of the others out of a local minimum.
         """
         added, rivals, swaps = list(added), dict(rivals), 0
-        queue = added[:-1]
+        queue = list(added)
         while queue and len(added) > 0:
             name = queue.pop(0)
             if name not in added:
@@ -170,12 +173,17 @@ class Search:
             without = self.stage(stage.model.without_effect(name), replace(self.settings, most_steps=LAST_STEPS))
             lost = without.level.total - stage.level.total
             part = repaired(without.level, stage.level)
-            if not material(without.level, stage.level) or (
-                part < FURTHER and lost < NEEDED * (base.level.total - stage.level.total)
+            others = [a for a in added if a != name]
+            if (
+                not material(without.level, stage.level)
+                or _mends_a_law(base, without, others, name, stage.level)
+                or (part < FURTHER and lost < NEEDED * (base.level.total - stage.level.total))
             ):
                 self.say(f"leaving out {name}")
                 added.remove(name)
                 stage, rivals, queue = without, {}, list(added)
+                continue
+            if name in rivals:
                 continue
             without = self.explore(without, most=LATER_REFITS)
             rivals[name] = without
@@ -230,16 +238,26 @@ def _with_values(model: Model, fitted: Model) -> Model:
     return model.with_values({k: fitted.value(k) for k in keys_of(fitted)}, source="fitted")
 
 
-def _worth(base: Level, before: Level, after: Level, part: float) -> bool:
+def _worth(base: Stage, before: Stage, added: Sequence[str], name: str, after: Level, part: float) -> bool:
     """Whether a further effect repairs enough (times ``part``): a good part of what is left, or something of what there
     was, where the others repair most of it. What repairs little where most is left would be a stand-in."""
-    if repaired(before, after) >= part * FURTHER:
+    if _mends_a_law(base, before, added, name, after, part):
+        return False
+    if repaired(before.level, after) >= part * FURTHER:
         return True
-    most = repaired(base, before) >= HOPELESS
-    return most and repaired(base, after) - repaired(base, before) >= part * NEEDED
+    most = repaired(base.level, before.level) >= HOPELESS
+    return most and repaired(base.level, after) - repaired(base.level, before.level) >= part * NEEDED
 
 
-def _anything(after: Level, part: float) -> bool:
+def _mends_a_law(base: Stage, before: Stage, others: Sequence[str], name: str, after: Level, part: float = 1.0) -> bool:
+    """Whether an effect repairs so little of all that it may be what the laws of the others leave."""
+    library = base.model.library
+    alike = any(subsystem(library[name]) == subsystem(library[other]) for other in others)
+    least = part * (LAW if alike else ELSEWHERE)
+    return before.level.total - after.total < least * (base.level.total - after.total)
+
+
+def _anything(name: str, after: Level, part: float) -> bool:
     """No more is asked than that a gain is one."""
     return True
 
