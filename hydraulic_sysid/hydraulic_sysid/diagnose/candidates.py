@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from hydraulic_sim import slots
@@ -18,6 +18,7 @@ from hydraulic_sim.model import Model
 
 SHAPES = (1.0, 0.3, 3.0, 8.0)  # of the default
 SIZES = (1.0, 0.25)  # of the default, measured from the null value
+LARGE = (10.0,)  # where those change nothing
 MOST_SHAPES = 7
 ANGLE = "rad"
 QUARTERS = tuple(0.5 * math.pi * i for i in range(4))  # angles that are tried
@@ -70,8 +71,11 @@ def observed(effect: Effect) -> bool:
     return any(p.observed for p in effect.parameters)
 
 
-def probes(effect: Effect, hints: Hints) -> Iterator[list[Probe]]:
-    """Groups of probes, one group per shape: each of its members moves one parameter off its null value."""
+def probes(effect: Effect, hints: Hints, sizes: Sequence[float] = SIZES) -> Iterator[list[Probe]]:
+    """Groups of probes, one group per shape: each of its members moves one parameter off its null value.
+
+    ``sizes``: how far, of the default; further ones than the first are for the default shape alone.
+    """
     if observed(effect):
         for p in effect.parameters:
             if p.observed == "resolution" and p.null is not None and p.bounds[0] < hints.resolution <= p.bounds[1]:
@@ -90,7 +94,7 @@ def probes(effect: Effect, hints: Hints) -> Iterator[list[Probe]]:
         tried[: MOST_SHAPES + len(lines)], itertools.product(QUARTERS, repeat=len(angles))
     ):
         given = {f"{effect.name}.{p.name}": v for p, v in zip([*shape, *angles], [*values, *turned], strict=True)}
-        for size in SIZES if values == first else SIZES[:1]:
+        for size in sizes if values == first else sizes[:1]:
             yield [_probe(effect, given, p, size) for p in moved]
 
 

@@ -19,7 +19,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.calibrate.steps import bounded_step
 
 from .anchor import Anchor, inner, project
-from .candidates import Hints, Probe, between, inverse, observed, probes
+from .candidates import LARGE, SIZES, Hints, Probe, between, inverse, observed, probes
 
 Array = NDArray[np.float64]
 
@@ -57,10 +57,13 @@ def sample(anchor: Anchor) -> tuple[Anchor, float]:
 def _prospect(anchor: Anchor, effect: Effect, hints: Hints, share: float) -> Prospect | None:
     plant = Plant(anchor.model.with_effect(effect.name))
     best: Prospect | None = None
-    for group in probes(effect, hints):
-        found = _predict(anchor, plant, effect, group)
-        if found is not None and (best is None or found.gain > best.gain):
-            best = found
+    for sizes in (SIZES, LARGE):
+        for group in probes(effect, hints, sizes):
+            found = _predict(anchor, plant, effect, group)
+            if found is not None and (best is None or found.gain > best.gain):
+                best = found
+        if best is not None:
+            break
     return None if best is None else replace(best, gain=best.gain / share)
 
 
@@ -78,9 +81,14 @@ def _predict(anchor: Anchor, plant: Plant, effect: Effect, group: list[Probe]) -
         return _as_observed(anchor, effect, group[0], columns[0])
     stacked = project(linear, [np.stack([c[i] for c in columns], axis=-1) for i in range(len(linear))])
     new = inner(anchor.split, stacked, stacked)
-    usable = np.diag(new) > 1e-12 * max(float(np.diag(new).max()), 1e-300)
-    if not usable.all() or float(np.diag(new).min()) < 1e-6:
+    size = np.diag(new)
+    usable = (size > 1e-12 * max(float(size.max()), 1e-300)) & (size >= 1e-6)
+    if not usable.any():
         return None
+    # What changes nothing by itself, as a damping where there is no spring, begins at its null value.
+    group = [p for p, u in zip(group, usable, strict=True) if u]
+    stacked = [s[..., usable] for s in stacked]
+    new = new[np.ix_(usable, usable)]
     cross = inner(anchor.split, anchor.beyond, stacked)
     information = np.block([[anchor.information, cross], [cross.T, new]])
     residual = [r[..., None] for r in anchor.residual]
