@@ -3,8 +3,9 @@
 The scores of pieces, and of whole records, are taken as independent clusters (Liang & Zeger, Biometrika 73 (1986));
 the larger error of the two counts. What a record says of a parameter depends on its experiment where the law of an
 effect is not quite the true one; the scatter between records then holds that too. What all records share of that
-they cannot show: no law of a library is that of a bench to better than a per cent or two, and an interval is never
-narrower (a model discrepancy in the sense of Kennedy & O'Hagan, J. R. Statist. Soc. B 63 (2001), as a fixed share).
+they cannot show: no law of a library is that of a bench to the last per cent, and an interval is never narrower (a
+model discrepancy in the sense of Kennedy & O'Hagan, J. R. Statist. Soc. B 63 (2001), as a fixed share). The laws of
+effects are the rougher ones; the search takes them to be right to a twentieth, too (`search.LAW`).
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from .anchor import Anchor, inner
 Array = NDArray[np.floating]
 
 _AT_BOUND = 1e-6
-_LAW = 0.01  # of a parameter's value: standard error for the law that it stands in
+_LAW = 0.01  # of a parameter's value: standard error for the law that it stands in, of the base physics …
+_EFFECT = 0.025  # … and of an effect
 _COVERED = 0.95
 
 
@@ -63,7 +65,7 @@ def parameter_errors(anchor: Anchor) -> dict[str, Known]:
     for i, key in enumerate(keys):
         scale = anchor.scales[key]
         told = math.isfinite(errors[i]) and errors[i] < 1e3
-        law = _LAW * abs(anchor.model.value(key))
+        law = (_EFFECT if "." in key else _LAW) * abs(anchor.model.value(key))
         error = math.hypot(float(errors[i]) * scale, law) if told else math.inf
         width = float(widths[i]) * scale + 2.0 * law if told else math.inf
         found[key] = Known(error, width, stuck[key])
