@@ -24,7 +24,6 @@ from .steps import LEAST_DAMPING, ahead, bounded_step
 Array = NDArray[np.float64]
 
 _MOST_DAMPING = 1e3
-_FLAT = 1e-6  # relative gain of a step from which on no more is expected of others
 _RESTED = 1e-4  # the same for the starts alone
 _RESTS = 4  # times that starts are moved where no parameter is fitted
 _NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured starts go further
@@ -47,6 +46,8 @@ class Settings:
     most_steps: int = 25
     tolerance: float = 0.1
     """The fit is done when another step would be shorter than this many standard errors."""
+    least_gain: float = 1e-6
+    """Or when a step lowers the sum of squares by no more than this share."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,7 @@ def _minimise(
             information, scores, gradient = _normal(shooting, values, scales, linear, settings)
             continue
         left = ahead(information, scores, values, scales, bounds)
-        if gain < _FLAT or left < settings.tolerance:
+        if gain < settings.least_gain or left < settings.tolerance:
             converged = True
             break
     pieces: list[Pieces] = shooting.pieces

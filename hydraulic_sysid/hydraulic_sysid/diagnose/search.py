@@ -26,7 +26,7 @@ PROMISING = 0.04  # of the best predicted gain, from which a candidate is refitt
 MOST_REFITS = 8
 LATER_REFITS = 4  # once something was added
 FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
-NEAR = 0.8  # of the best gain, from which a refit is finished
+NEAR = 0.93  # of the best gain, from which a refit is finished
 MOST_EFFECTS = 3
 FURTHER = 0.25  # of what is left, which a further effect must repair, unless it repairs a good part of all
 NEEDED = 0.02  # of all that was repaired, which an effect must repair beside the others to stay
@@ -35,9 +35,12 @@ ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.1  # of what an effect repairs, by which a quick refit in its place may lie above, to be finished
 SETTLED = 0.006  # mean square beyond the noise below which nothing more is looked for
 MOST_SWAPS = 3
+MOSTLY = 0.9  # of what noise does not explain: where more is repaired, nobody asks what else might be nearest
+ALONE = 0.5  # of what the best candidate repairs at first, below which all others leave it without a rival
 HOPELESS = 0.6  # of what noise does not explain: where less is repaired, exchanging effects will not do either
 PROMISED = 0.5  # of what an effect must repair, which its quick refit must show for it to be fitted to the end
-LAST_STEPS = 8  # of a fit that begins where a quick refit ended
+LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
+LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
 
 Say = Callable[[str], None]
 Enough = Callable[[str, Level, float], bool]
@@ -84,6 +87,7 @@ class Search:
 
     def __init__(self, split: Split, settings: Settings, say: Say, hints: Callable[[Anchor], Hints]) -> None:
         self.split, self.settings, self.say, self._hints = split, settings, say, hints
+        self._last = replace(settings, most_steps=LAST_STEPS, least_gain=LAST_GAIN)
 
     def stage(self, model: Model, settings: Settings | None = None) -> Stage:
         """Fit a model and linearise it."""
@@ -124,7 +128,7 @@ class Search:
         for trial in [t for t in worth if base.level.total - t.level.total >= NEAR * top][:FULL]:
             self.say(f"fitting with {trial.name}")
             try:
-                found.append(self.stage(trial.refit.model, replace(self.settings, most_steps=LAST_STEPS)))
+                found.append(self.stage(trial.refit.model, self._last))
             except SimulationError:
                 continue
         found = [f for f in found if material(base.level, f.level) and enough(_new(f, base), f.level, 1.0)]
@@ -142,7 +146,8 @@ class Search:
                 break
             added.append(_new(better, path[-1]))
             nothing = better.level.variance - 1.0 < SETTLED
-            path.append(better if nothing else self.explore(better, most=LATER_REFITS))
+            enough = len(added) == MOST_EFFECTS and repaired(base.level, better.level) > MOSTLY
+            path.append(better if nothing or enough else self.explore(better, most=LATER_REFITS))
             if nothing:
                 break
         rivals = {added[-1]: path[-2]} if added else {}
@@ -170,7 +175,10 @@ class Search:
             if len(added) == 1:
                 rivals[name] = base
                 break
-            without = self.stage(stage.model.without_effect(name), replace(self.settings, most_steps=LAST_STEPS))
+            if _unrivalled(base, name):
+                rivals[name] = base
+                continue
+            without = self.stage(stage.model.without_effect(name), self._last)
             lost = without.level.total - stage.level.total
             part = repaired(without.level, stage.level)
             others = [a for a in added if a != name]
@@ -260,6 +268,13 @@ def _mends_a_law(base: Stage, before: Stage, others: Sequence[str], name: str, a
 def _anything(name: str, after: Level, part: float) -> bool:
     """No more is asked than that a gain is one."""
     return True
+
+
+def _unrivalled(base: Stage, name: str) -> bool:
+    """Whether an effect repairs by itself most of what is off, and no other candidate comes near it."""
+    found = {t.name: base.level.total - t.level.total for t in base.trials}
+    others = max((gain for other, gain in found.items() if other != name), default=0.0)
+    return found.get(name, 0.0) > MOSTLY * base.level.excess and others < ALONE * found[name]
 
 
 def _new(stage: Stage, before: Stage) -> str:
