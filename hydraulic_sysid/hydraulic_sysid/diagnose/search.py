@@ -24,7 +24,8 @@ from .screen import Prospect, screen
 
 PROMISING = 0.04  # of the best predicted gain, from which a candidate is refitted
 MOST_REFITS = 8
-LATER_REFITS = 4  # once something was added
+LATER_REFITS = 4  # once something was added, …
+ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
 FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
 NEAR = 0.93  # of the best gain, from which a refit is finished
 MOST_EFFECTS = 3
@@ -106,7 +107,7 @@ class Search:
             return base
         floor = max(PROMISING * found[0].gain, 0.2 * base.level.least)
         trials = []
-        for prospect in [p for p in found if p.gain > floor][:most]:
+        for prospect in _varied([p for p in found if p.gain > floor], ALIKE if most < MOST_REFITS else most)[:most]:
             self.say(f"refitting with {prospect.effect.name}")
             done = refit(point, point.model.with_effect(prospect.effect.name), prospect.start)
             if _observed(base.model):
@@ -258,9 +259,14 @@ def _worth(base: Stage, before: Stage, added: Sequence[str], name: str, after: L
 
 
 def _mends_a_law(base: Stage, before: Stage, others: Sequence[str], name: str, after: Level, part: float = 1.0) -> bool:
-    """Whether an effect repairs so little of all that it may be what the laws of the others leave."""
+    """Whether an effect repairs so little of all that it may be what the laws of the others leave.
+
+    One of another subsystem that repairs most of what is left is believed.
+    """
     library = base.model.library
     alike = any(subsystem(library[name]) == subsystem(library[other]) for other in others)
+    if not alike and repaired(before.level, after) >= part * HOPELESS:
+        return False
     least = part * (LAW if alike else ELSEWHERE)
     return before.level.total - after.total < least * (base.level.total - after.total)
 
@@ -268,6 +274,12 @@ def _mends_a_law(base: Stage, before: Stage, others: Sequence[str], name: str, a
 def _anything(name: str, after: Level, part: float) -> bool:
     """No more is asked than that a gain is one."""
     return True
+
+
+def _varied(found: Sequence[Prospect], most: int) -> list[Prospect]:
+    """In their order, and no more than so many of one subsystem."""
+    places = [subsystem(p.effect) for p in found]
+    return [p for i, p in enumerate(found) if places[:i].count(places[i]) < most]
 
 
 def _unrivalled(base: Stage, name: str) -> bool:
