@@ -14,8 +14,9 @@ from hydraulic_sysid.records import read_all
 RIGHT_FIRST = (
     benches.Bench("single", ("coulomb_friction",), "strong", 1),
     benches.Bench("single", ("valve_deadband",), "mild", 1),
-    benches.Bench("single", ("entrained_air",), "strong", 1),
-    benches.Bench("single", ("supply_droop",), "mild", 1),
+    benches.Bench("single", ("presliding",), "strong", 1),
+    benches.Bench("single", ("pump_ripple",), "mild", 1),
+    benches.Bench("single", ("sensor_quantisation",), "mild", 1),
     benches.Bench("single", ("sensor_lag",), "strong", 1),
 )
 

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
+from hydraulic_sysid.calibrate.estimate import scale
 from hydraulic_sysid.diagnose import DiagnosisError, add, diagnose, verdict
 from hydraulic_sysid.diagnose.anchor import SCATTER, bounded
 from hydraulic_sysid.diagnose.candidates import Hints, between, candidates, inverse, probes
+from hydraulic_sysid.diagnose.hints import spectral_lines
 from hydraulic_sysid.diagnose.levels import Level, material, repaired
 from hydraulic_sysid.diagnose.pieces import split
+from hydraulic_sysid.diagnose.screen import Prospect
+from hydraulic_sysid.diagnose.search import Stage, Trial, _mends_a_law, _unrivalled, _varied
 from hydraulic_sysid.diagnose.shapes import FILES
 from hydraulic_sysid.noise import code_step
 from hydraulic_sysid.records import Record
@@ -77,6 +83,69 @@ def test_lines_are_tried_where_a_shape_is_a_frequency(model) -> None:
     tried = {p.values["pump_ripple.frequency"] for g in probes(ripple, Hints(lines=(33.0,))) for p in g}
     assert 33.0 in tried
     assert 33.0 not in {p.values["pump_ripple.frequency"] for g in probes(ripple, Hints()) for p in g}
+
+
+@pytest.mark.parametrize("line", [7.0, 32.414, 180.3])
+@pytest.mark.parametrize("reversals", [0.1, 0.46, 1.3])
+def test_a_line_that_the_valve_turns_over_is_found_between_its_side_bands(line: float, reversals: float) -> None:
+    time = DT * np.arange(20001)
+    drive = np.sign(np.sin(2.0 * np.pi * reversals * time))
+    seen = drive * np.sin(2.0 * np.pi * line * time + 0.7) + np.random.default_rng(5).standard_normal(time.size)
+    starts = np.arange(0, 20000, 500)
+    record = Record.sampled("r", DT, {"drive": drive, "position": np.zeros(time.size)})
+    pieces = SimpleNamespace(record=record, starts=starts, samples=501, channels=("position",), free=np.arange(2))
+    residual = np.concatenate([seen[starts[:, None] + np.arange(501)], np.zeros((len(starts), 2))], axis=1)
+    anchor = SimpleNamespace(split=SimpleNamespace(pieces=[pieces]), residual=[residual])
+    assert spectral_lines(anchor)[0] == pytest.approx(line, abs=0.01)  # type: ignore[arg-type]
+
+
+def test_an_angle_is_tried_with_every_frequency(model) -> None:
+    tried = [group[0].values for group in probes(model.library["pump_ripple"], Hints(lines=(31.0,)))]
+    angles = {v["pump_ripple.phase"] for v in tried if v["pump_ripple.frequency"] == 31.0}
+    assert len(angles) == 4 and max(angles) == pytest.approx(1.5 * np.pi)
+
+
+def test_a_parameter_whose_value_and_default_are_zero_has_a_scale(model) -> None:
+    with_ripple = model.with_effect("pump_ripple")
+    assert scale(with_ripple, "pump_ripple.phase") == pytest.approx(0.14)
+    assert scale(with_ripple, "pump_ripple.amplitude") == with_ripple.value("pump_ripple.amplitude")
+
+
+def stage(model, total: float, trials: dict[str, float]) -> Stage:
+    """A stage with that sum of squares, and those of its trials."""
+    found = [Trial(name, 0.0, None, at(left)) for name, left in trials.items()]  # type: ignore[arg-type]
+    return Stage(model, None, at(total), found)  # type: ignore[arg-type]
+
+
+def at(total: float) -> Level:
+    return Level(2.0 * total / 3.0, total / 3.0, 2000, 1000)
+
+
+@pytest.mark.parametrize(
+    ("name", "left", "mends"),
+    [
+        ("valve_underlap", 4000.0, True),  # of the valve's own, repairs a thousandth of all
+        ("valve_underlap", 3000.0, False),  # … and three thousandths
+        ("constant_load", 4500.0, False),  # elsewhere a thousandth is enough
+        ("constant_load", 5300.0, True),
+        ("constant_load", 3050.0, False),  # and most of what is left always is
+    ],
+)
+def test_what_a_law_leaves_is_no_effect(model, name: str, left: float, mends: bool) -> None:
+    base, before = stage(model, 1.0e6, {}), stage(model, 5500.0, {})
+    assert _mends_a_law(base, before, ["valve_deadband"], name, at(left)) is mends
+
+
+def test_the_only_candidate_that_repairs_anything_has_no_rival(model) -> None:
+    assert _unrivalled(stage(model, 1e6, {"valve_deadband": 1e4, "backlash": 8e5}), "valve_deadband")
+    assert not _unrivalled(stage(model, 1e6, {"valve_deadband": 1e4, "backlash": 3e5}), "valve_deadband")
+    assert not _unrivalled(stage(model, 1e6, {"valve_deadband": 4e5, "backlash": 8e5}), "valve_deadband")
+
+
+def test_later_refits_are_not_all_of_one_subsystem(model) -> None:
+    names = ("spool_dynamics", "command_delay", "spool_rate_limit", "entrained_air")
+    found = _varied([Prospect(model.library[name], 1.0, {}) for name in names], 2)
+    assert [p.effect.name for p in found] == ["spool_dynamics", "command_delay", "entrained_air"]
 
 
 def test_an_observed_parameter_is_tried_at_what_was_seen_alone(model) -> None:
