@@ -17,7 +17,7 @@ from hydraulic_sysid.diagnose.hints import spectral_lines
 from hydraulic_sysid.diagnose.levels import Level, material, repaired
 from hydraulic_sysid.diagnose.pieces import split
 from hydraulic_sysid.diagnose.screen import Prospect
-from hydraulic_sysid.diagnose.search import Stage, Trial, _mends_a_law, _unrivalled, _varied
+from hydraulic_sysid.diagnose.search import Found, Stage, Trial, _mends_a_law, _unrivalled, _varied
 from hydraulic_sysid.diagnose.shapes import FILES
 from hydraulic_sysid.noise import code_step
 from hydraulic_sysid.records import Record
@@ -134,6 +134,21 @@ def at(total: float) -> Level:
 def test_what_a_law_leaves_is_no_effect(model, name: str, left: float, mends: bool) -> None:
     base, before = stage(model, 1.0e6, {}), stage(model, 5500.0, {})
     assert _mends_a_law(base, before, ["valve_deadband"], name, at(left)) is mends
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kind"),
+    [
+        (1.39, 1.12, verdict.MISSING),  # near the noise a law may leave more …
+        (1.39, 1.19, verdict.OUTSIDE),  # … but not all it likes
+        (10.0, 3.3, verdict.OUTSIDE),
+        (10.0, 2.5, verdict.MISSING),
+    ],
+)
+def test_what_an_effect_leaves_decides_whether_it_is_the_one(model, before: float, after: float, kind: str) -> None:
+    with_it = model.with_effect("constant_load")
+    found = Found(stage(model, 3000 * before, {}), stage(with_it, 3000 * after, {}), ["constant_load"], [], {})
+    assert verdict.kind_of(found, {}) == kind
 
 
 def test_the_only_candidate_that_repairs_anything_has_no_rival(model) -> None:
