@@ -151,10 +151,19 @@ def test_what_an_effect_leaves_decides_whether_it_is_the_one(model, before: floa
     assert verdict.kind_of(found, {}) == kind
 
 
-def test_the_only_candidate_that_repairs_anything_has_no_rival(model) -> None:
-    assert _unrivalled(stage(model, 1e6, {"valve_deadband": 1e4, "backlash": 8e5}), "valve_deadband")
-    assert not _unrivalled(stage(model, 1e6, {"valve_deadband": 1e4, "backlash": 3e5}), "valve_deadband")
-    assert not _unrivalled(stage(model, 1e6, {"valve_deadband": 4e5, "backlash": 8e5}), "valve_deadband")
+@pytest.mark.parametrize(
+    ("own", "other", "final", "alone"),
+    [
+        (1e4, 8e5, 9e3, True),  # the other repairs a fifth
+        (1e4, 3e5, 9e3, False),  # … or most of it, while not all is explained
+        (4e5, 8e5, 9e3, False),  # it is not the whole answer itself
+        (5e3, 5e4, 3.1e3, True),  # all is explained, and the other leaves twenty times as much
+        (5e3, 1e4, 3.1e3, False),
+    ],
+)
+def test_a_candidate_that_no_other_comes_near_has_no_rival(model, own, other, final, alone) -> None:
+    base = stage(model, 1e6, {"valve_deadband": own, "backlash": other})
+    assert _unrivalled(base, stage(model, final, {}), "valve_deadband") is alone
 
 
 def test_later_refits_are_not_all_of_one_subsystem(model) -> None:

@@ -27,14 +27,16 @@ MOST_REFITS = 8
 LATER_REFITS = 4  # once something was added, …
 ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
 FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
-NEAR = 0.93  # of the best gain, from which a refit is finished
+NEAR = 0.93  # of the best gain, from which a refit is finished, …
+FAR = 5.0  # … if it leaves no more than so many times what the best leaves
 MOST_EFFECTS = 3
 FURTHER = 0.25  # of what is left, which a further effect must repair, unless it repairs a good part of all
 NEEDED = 0.02  # of all that was repaired, which an effect must repair beside the others to stay
 LAW = 0.0025  # of all that was repaired: what a law that is right to a twentieth leaves for others of its subsystem …
 ELSEWHERE = 0.0005  # … and for those of other subsystems
-DISTANT = 0.1  # of what an effect repairs, by which a quick refit in its place may lie above, to be finished
+DISTANT = 0.02  # of what an effect repairs, by which a quick refit in its place may lie above, to be finished
 SETTLED = 0.006  # mean square beyond the noise below which nothing more is looked for
+EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
 MOST_SWAPS = 3
 MOSTLY = 0.9  # of what noise does not explain: where more is repaired, nobody asks what else might be nearest
 ALONE = 0.5  # of what the best candidate repairs at first, below which all others leave it without a rival
@@ -126,7 +128,8 @@ class Search:
             return None
         top = base.level.total - worth[0].level.total
         found = []
-        for trial in [t for t in worth if base.level.total - t.level.total >= NEAR * top][:FULL]:
+        near = [t for t in worth if base.level.total - t.level.total >= NEAR * top]
+        for trial in [t for t in near if t.level.excess <= FAR * worth[0].level.excess + t.level.least][:FULL]:
             self.say(f"fitting with {trial.name}")
             try:
                 found.append(self.stage(trial.refit.model, self._last))
@@ -176,7 +179,7 @@ class Search:
             if len(added) == 1:
                 rivals[name] = base
                 break
-            if _unrivalled(base, name):
+            if _unrivalled(base, stage, name):
                 rivals[name] = base
                 continue
             without = self.stage(stage.model.without_effect(name), self._last)
@@ -282,11 +285,16 @@ def _varied(found: Sequence[Prospect], most: int) -> list[Prospect]:
     return [p for i, p in enumerate(found) if places[:i].count(places[i]) < most]
 
 
-def _unrivalled(base: Stage, name: str) -> bool:
-    """Whether an effect repairs by itself most of what is off, and no other candidate comes near it."""
-    found = {t.name: base.level.total - t.level.total for t in base.trials}
-    others = max((gain for other, gain in found.items() if other != name), default=0.0)
-    return found.get(name, 0.0) > MOSTLY * base.level.excess and others < ALONE * found[name]
+def _unrivalled(base: Stage, final: Stage, name: str) -> bool:
+    """Whether an effect repairs by itself most of what is off, and no other candidate comes near it: by what they
+    repair or, where in the end all is explained, by what they leave."""
+    found = {t.name: t.level for t in base.trials}
+    if name not in found or base.level.total - found[name].total < MOSTLY * base.level.excess:
+        return False
+    others = [at for other, at in found.items() if other != name]
+    alone = all(base.level.total - at.total < ALONE * (base.level.total - found[name].total) for at in others)
+    explained = final.level.variance - 1.0 < EXPLAINED
+    return alone or (explained and all(at.excess > FAR * (found[name].excess + at.least) for at in others))
 
 
 def _new(stage: Stage, before: Stage) -> str:
