@@ -53,7 +53,7 @@ def main(argv: list[str] | None = None) -> int:
     if options.doc:
         given = argv if argv is not None else sys.argv[1:]
         shown = " ".join(["python benchmarks/diagnosis_matrix.py", *(a for a in given if a != "--report-only")])
-        PAGE.write_text(matrix.document(found, f"./bench shell -- {shown}"))
+        PAGE.write_text(matrix.document(found, f"./bench shell -- {shown}", len(chosen)))
         print(PAGE)
     return 0
 

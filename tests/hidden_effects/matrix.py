@@ -188,8 +188,8 @@ def confusion_rows(found: list[dict[str, Any]]) -> list[str]:
     return rows
 
 
-def document(found: list[dict[str, Any]], command: str) -> str:
-    """The page docs/diagnosis-matrix.md."""
+def document(found: list[dict[str, Any]], command: str, catalogued: int) -> str:
+    """The page docs/diagnosis-matrix.md; ``catalogued``: how many benches there are to examine."""
     seconds = sorted(d["cpu_seconds"] for d in found)
     peak = max(d.get("peak_MiB", 0.0) for d in found)
     lines = [
@@ -202,7 +202,8 @@ def document(found: list[dict[str, Any]], command: str) -> str:
         "",
         f"    {command}",
         "",
-        f"{len(found)} benches; a diagnosis took {seconds[len(seconds) // 2]:.0f} s of processor time (median), "
+        f"{len(found)} of {catalogued} benches, in a shuffled order; a diagnosis took "
+        f"{seconds[len(seconds) // 2]:.0f} s of processor time (median), "
         f"{seconds[-1]:.0f} s (longest), and at most {peak:.0f} MiB.",
         "",
         "## Figures",

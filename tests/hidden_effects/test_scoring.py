@@ -95,7 +95,7 @@ def test_selection_and_page(tmp_path):
     bench = benches.Bench("single", ("valve_deadband",), "mild", 1)
     width = bench.truth()["valve_deadband"]["width"]
     marks = scoring.judge(bench.answer(), said("missing", effect("valve_deadband", width=(width, 1e-4))))
-    page = matrix.document([{"marks": marks, "cpu_seconds": 12.0, "peak_MiB": 300.0}], "the command")
+    page = matrix.document([{"marks": marks, "cpu_seconds": 12.0, "peak_MiB": 300.0}], "the command", 160)
     assert "    the command" in page and "| valve_deadband | 1 | valve_deadband |" in page
     assert "| one hidden effect: right name first | ≥ 90 % | 1/1 = 100 % | 21…100 % |" in page
     assert matrix.gather([bench], tmp_path) == []
