@@ -13,15 +13,14 @@ from hydraulic_sysid.calibrate.segments import SegmentError
 from hydraulic_sysid.records import Record
 
 from .anchor import bounded
-from .chord import refit
 from .diagnosis import DiagnosisError, finished
 from .document import added_document
 from .errors import parameter_errors
 from .hints import hints
-from .levels import level, material
+from .levels import material
 from .pieces import split
 from .screen import screen
-from .search import Found, Search, Trial
+from .search import Found, Search
 
 
 @dataclass(frozen=True)
@@ -63,12 +62,11 @@ def add(
         prospects = screen(base.anchor, [model.library[effect]], hints(base.anchor))
         if not prospects:
             raise DiagnosisError(f"{effect} changes nothing in these records: they do not excite it")
-        done = refit(base.anchor, base.model.with_effect(effect), prospects[0].start)
+        trial = search.trial(base, prospects[0])
         say(f"fitting with {effect}")
-        final = search.stage(done.model)
+        final = search.stage(trial.refit.model)
     except (SegmentError, CalibrationError) as error:
         raise DiagnosisError(str(error)) from None
-    trial = Trial(effect, prospects[0].gain, done, level(parts, done))
     base = replace(base, trials=[trial], prospects=prospects)
     found = Found(base, final, [effect], [(effect, final.level)], {effect: base})
     confirmed = material(base.level, final.level)

@@ -94,12 +94,12 @@ class Search:
 
     def stage(self, model: Model, settings: Settings | None = None) -> Stage:
         """Fit a model and linearise it."""
-        smooth = model
-        for name in _observed(model):
+        smooth, seen = model, _observed(model)
+        for name in seen:
             smooth = smooth.without_effect(name)
         there = anchor(fitted(smooth, self.split, settings or self.settings), self.split)
         whole = _with_values(model, there.model)
-        return Stage(whole, there, level(self.split, as_it_is(there, whole) if _observed(model) else there))
+        return Stage(whole, there, level(self.split, as_it_is(there, whole) if seen else there))
 
     def explore(self, base: Stage, exclude: Sequence[str] = (), most: int = MOST_REFITS) -> Stage:
         """Screen all candidates on a stage and refit the best."""
@@ -111,12 +111,17 @@ class Search:
         trials = []
         for prospect in _varied([p for p in found if p.gain > floor], ALIKE if most < MOST_REFITS else most)[:most]:
             self.say(f"refitting with {prospect.effect.name}")
-            done = refit(point, point.model.with_effect(prospect.effect.name), prospect.start)
-            if _observed(base.model):
-                done = as_it_is(point, _with_values(base.model.with_effect(prospect.effect.name), done.model))
-            trials.append(Trial(prospect.effect.name, prospect.gain, done, level(self.split, done)))
+            trials.append(self.trial(base, prospect))
         trials.sort(key=lambda t: t.level.total)
         return replace(base, anchor=point.slim(), trials=trials, prospects=found)
+
+    def trial(self, base: Stage, prospect: Prospect) -> Trial:
+        """A candidate refitted on a stage, from where the screen saw it."""
+        point, name = base.anchor, prospect.effect.name
+        done = refit(point, point.model.with_effect(name), prospect.start)
+        if _observed(base.model):
+            done = as_it_is(point, _with_values(base.model.with_effect(name), done.model))
+        return Trial(name, prospect.gain, done, level(self.split, done))
 
     def finish(self, base: Stage, enough: Enough) -> Stage | None:
         """The best of the trials, fitted to the end; None where none is worth it.
@@ -150,8 +155,8 @@ class Search:
                 break
             added.append(_new(better, path[-1]))
             nothing = better.level.variance - 1.0 < SETTLED
-            enough = len(added) == MOST_EFFECTS and repaired(base.level, better.level) > MOSTLY
-            path.append(better if nothing or enough else self.explore(better, most=LATER_REFITS))
+            last = len(added) == MOST_EFFECTS and repaired(base.level, better.level) > MOSTLY
+            path.append(better if nothing or last else self.explore(better, most=LATER_REFITS))
             if nothing:
                 break
         rivals = {added[-1]: path[-2]} if added else {}

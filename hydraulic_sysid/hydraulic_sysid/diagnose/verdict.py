@@ -19,8 +19,8 @@ OUTSIDE = "outside the library"
 
 UNSEEN = 0.015  # mean square beyond the noise that a noise floor estimated from data may miss
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
-NEARLY = 1.2  # mean square over noise below which that is a matter of a law's details up to …
-NEAR = 0.4  # … this share
+SMALL = 1.2  # mean square over noise below which more may be left …
+SMALL_UNEXPLAINED = 0.4  # … namely this share
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 LARGE = 1.03  # residual over noise from which something is missing although no effect of the library is
 
@@ -57,7 +57,7 @@ def kind_of(
     final = found.final.level
     if not found.added:
         return OUTSIDE if final.variance > LARGE**2 else COMPLETE
-    allowed = STRAINED if strained(found) else NEAR if final.variance < NEARLY else UNEXPLAINED
+    allowed = STRAINED if strained(found) else SMALL_UNEXPLAINED if final.variance < SMALL else UNEXPLAINED
     if left_over(found) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
     return TIED if family or any(not r.told_apart for every in rivals.values() for r in every) else MISSING
