@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hidden_effects import benches, scoring
@@ -47,6 +48,11 @@ def test_the_step_of_a_coarse_sensor_is_read_off_its_readings(tmp_path):
     assert result["verdict"]["effects"] == ["sensor_quantisation"], result["verdict"]
     (step,) = result["effects"][0]["parameters"]
     assert step["value"] == pytest.approx(bench.truth()["sensor_quantisation"]["step"], rel=1e-4)
+    for shown in result["curves"]:  # and the curves of the report are rounded, too
+        position = shown["channels"]["position"]
+        codes = position["after"] / step["value"]
+        assert np.abs(codes - np.round(codes)).max() < 0.02
+        assert np.abs(position["before"] / step["value"] - np.round(position["before"] / step["value"])).max() > 0.1
 
 
 @pytest.mark.timeout(600)

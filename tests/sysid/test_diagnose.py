@@ -114,7 +114,7 @@ def test_a_parameter_whose_value_and_default_are_zero_has_a_scale(model) -> None
 def stage(model, total: float, trials: dict[str, float]) -> Stage:
     """A stage with that sum of squares, and those of its trials."""
     found = [Trial(name, 0.0, None, at(left)) for name, left in trials.items()]  # type: ignore[arg-type]
-    return Stage(model, None, at(total), found)  # type: ignore[arg-type]
+    return Stage(model, None, at(total), [], found)  # type: ignore[arg-type]
 
 
 def at(total: float) -> Level:

@@ -8,7 +8,7 @@ damped (Levenberg-Marquardt), so that what is approximate costs steps and not tr
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +35,15 @@ _ROUNDED = 6  # the same where what is measured is rounded, and the sensitivitie
 
 @dataclass(frozen=True)
 class Refit:
-    """A model refitted: ``costs[i]`` (S_i,) sums of squares of every piece, ``fitted`` over the fitted ones."""
+    """A model refitted: ``costs[i]`` (S_i,) sums of squares of every piece, ``fitted`` over the fitted ones, and, of
+    `as_it_is`, the residuals ``raw[i]`` (S_i, m)."""
 
     model: Model
     costs: list[Array]
     fitted: float
     held_out: float
     added: tuple[str, ...]
+    raw: list[Array] = field(default_factory=list)
 
 
 def refit(anchor: Anchor, model: Model, start: Mapping[str, float], most_steps: int = MOST_STEPS) -> Refit:
@@ -62,7 +64,7 @@ def refit(anchor: Anchor, model: Model, start: Mapping[str, float], most_steps: 
         now, damping = better, max(damping / 5.0, 1e-6)
         if gain < _FLAT:
             break
-    costs = fit.settled(now)
+    costs, _ = fit.settled(now)
     done = model.with_values(within(model, now.values), source="fitted")
     return Refit(done, costs, *fit.sums(costs), tuple(fit.own))
 
@@ -71,8 +73,8 @@ def as_it_is(anchor: Anchor, model: Model) -> Refit:
     """``model``, which has the anchor's effects and more, with the values it has; only starts of pieces are moved."""
     fit = _Fit(anchor, model, {})
     now = fit._at({k: model.value(k) for k in keys_of(model)}, [s.copy() for s in anchor.shooting.starts])
-    costs = anchor.costs if now is None else fit.settled(now, _ROUNDED)
-    return Refit(model, costs, *fit.sums(costs), ())
+    costs, raw = (anchor.costs, anchor.residual) if now is None else fit.settled(now, _ROUNDED)
+    return Refit(model, costs, *fit.sums(costs), (), raw)
 
 
 @dataclass(frozen=True)
@@ -158,8 +160,8 @@ class _Fit:
             damping *= 8.0
         return None, damping
 
-    def settled(self, now: _Point, rests: int = _RESTS) -> list[Array]:
-        """Sums of squares (S,) of the pieces per record, each from the best of a few starts."""
+    def settled(self, now: _Point, rests: int = _RESTS) -> tuple[list[Array], list[Array]]:
+        """Sums of squares (S,) and residuals (S, m) of the pieces per record, each from the best of a few starts."""
         costs = [np.sum(r**2, axis=1) for r in now.residual]
         starts, raw = now.starts, now.raw
         for _ in range(rests):
@@ -171,7 +173,7 @@ class _Fit:
             costs = [np.where(c, b, a) for a, b, c in zip(costs, left, better, strict=True)]
             starts = [np.where(c[:, None], n, s) for s, n, c in zip(starts, there.starts, better, strict=True)]
             raw = [np.where(c[:, None], n, r) for r, n, c in zip(raw, there.raw, better, strict=True)]
-        return costs
+        return costs, raw
 
     def _rested(self, starts: list[Array], raw: list[Array]) -> list[Array]:
         """Starts moved to where these residuals ask for, to first order."""

@@ -6,19 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from .anchor import Anchor
 from .pieces import Split
+from .search import Stage
 
 MOST = 4
 
 
-def curves(split: Split, before: Anchor, after: Anchor) -> list[dict[str, Any]]:
+def curves(split: Split, before: Stage, after: Stage) -> list[dict[str, Any]]:
     """Held-out pieces (fitted ones where none are) with the largest residual before, one per record at most."""
     found = []
     for i, (pieces, chosen) in enumerate(zip(split.pieces, split.fitted, strict=True)):
         usable = np.flatnonzero(~chosen) if (~chosen).any() else np.arange(len(chosen))
-        worst = int(usable[np.argmax(before.costs[i][usable])])
-        found.append((float(before.costs[i][worst] / pieces.samples), i, worst))
+        worst = int(usable[np.argmax(before.anchor.costs[i][usable])])
+        found.append((float(before.anchor.costs[i][worst] / pieces.samples), i, worst))
     rows = []
     for _, i, k in sorted(found, reverse=True)[:MOST]:
         pieces = split.pieces[i]
@@ -45,5 +45,5 @@ def curves(split: Split, before: Anchor, after: Anchor) -> list[dict[str, Any]]:
     return rows
 
 
-def _residual(anchor: Anchor, record: int, piece: int, shape: tuple[int, int]) -> np.ndarray:
-    return anchor.residual[record][piece, : shape[0] * shape[1]].reshape(shape)
+def _residual(stage: Stage, record: int, piece: int, shape: tuple[int, int]) -> np.ndarray:
+    return stage.residual[record][piece, : shape[0] * shape[1]].reshape(shape)

@@ -85,7 +85,7 @@ def document(
         "shapes": [_shape(s) for s in shapes],
         "nearest": [t.name for t in final.trials[:_NEAREST]] if kind == verdict.OUTSIDE else [],
         "balances": [],
-        "curves": curves(parts, base.anchor, final.anchor),
+        "curves": curves(parts, base, final),
     }
 
 

@@ -11,6 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sysid.calibrate.estimate import Settings
@@ -64,12 +67,13 @@ class Stage:
     """A model with some effects, fitted, and the candidates tried on top of it, best first.
 
     ``anchor`` has no effects that records show by themselves: such as rounding have no derivative, and `model` and
-    ``level`` are with them, the parameters as they are without.
+    ``level`` are with them, the parameters as they are without; ``residual`` (S, m) per record is what `model` leaves.
     """
 
     model: Model
     anchor: Anchor
     level: Level
+    residual: list[NDArray[np.float64]]
     trials: list[Trial] = field(default_factory=list)
     prospects: list[Prospect] = field(default_factory=list)
 
@@ -99,7 +103,10 @@ class Search:
             smooth = smooth.without_effect(name)
         there = anchor(fitted(smooth, self.split, settings or self.settings), self.split)
         whole = _with_values(model, there.model)
-        return Stage(whole, there, level(self.split, as_it_is(there, whole) if seen else there))
+        if not seen:
+            return Stage(whole, there, level(self.split, there), there.residual)
+        rounded = as_it_is(there, whole)
+        return Stage(whole, there, level(self.split, rounded), rounded.raw)
 
     def explore(self, base: Stage, exclude: Sequence[str] = (), most: int = MOST_REFITS) -> Stage:
         """Screen all candidates on a stage and refit the best."""
