@@ -16,7 +16,7 @@ import time
 import numpy as np
 from scipy.signal import lfilter
 
-from hydraulic_sysid.linear_models import ArxOrder, fit_arx
+from hydraulic_sysid.linear.models import ArxOrder, fit_arx
 
 SAMPLES = 1_000_000
 ORDER = ArxOrder(3, 3, 1)

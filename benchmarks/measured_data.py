@@ -15,9 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hydraulic_sysid import metrics
-from hydraulic_sysid.identification import Settings, identify
-from hydraulic_sysid.linear_models import (
+from hydraulic_sysid.data.records import read_records
+from hydraulic_sysid.diagnosis.grey_box.valve_actuator import fit_valve_actuator
+from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.linear.identification import Settings, identify
+from hydraulic_sysid.linear.models import (
     Arx,
     ArxOrder,
     IdentificationError,
@@ -27,8 +29,6 @@ from hydraulic_sysid.linear_models import (
     best,
     try_orders,
 )  # fmt: skip
-from hydraulic_sysid.nonlinear import fit_valve_actuator
-from hydraulic_sysid.records import read_records
 
 # As quoted in the literature for this split; not computed here.
 QUOTED = {"wavelet network": 0.579, "sigmoid network": 0.467, "recurrent network": 0.328}

@@ -23,7 +23,7 @@ from domain_coordinator import domain_id
 from mcap.reader import make_reader
 
 from hydraulic_interfaces.contract import topic
-from hydraulic_sysid.records import Record, read_records, to_bag
+from hydraulic_sysid.data.records import Record, read_records, to_bag
 
 STREAMS = ("state", "pressure_a", "pressure_b", "pressure_supply", "command")
 PERIOD_NS = 1_000_000

@@ -16,7 +16,7 @@ import pytest
 from hydraulic_bringup.demo import offline, online, processes
 from hydraulic_bringup.demo.errors import DemoError
 from hydraulic_bringup.verbs import demo
-from hydraulic_sysid.records import Record, to_bag
+from hydraulic_sysid.data.records import Record, to_bag
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
 

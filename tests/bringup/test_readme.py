@@ -17,8 +17,8 @@ import yaml
 
 from hydraulic_bringup.entry.cli import verb_names
 from hydraulic_interfaces import contract
+from hydraulic_sysid.data.records import load_column_map, parse_column_map, read_records, shipped_maps
 from hydraulic_sysid.excitation import load_plan
-from hydraulic_sysid.records import load_column_map, parse_column_map, read_records, shipped_maps
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

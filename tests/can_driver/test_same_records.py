@@ -22,12 +22,12 @@ from hydraulic_can_driver.cia408 import State
 from hydraulic_can_driver.virtual import VirtualBench
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.resampling import held_average
+from hydraulic_sysid.estimation.metrics import best_fit
 from hydraulic_sysid.excitation import load_plan
-from hydraulic_sysid.identification import Settings, identify_model
-from hydraulic_sysid.linear_models import Arx, ArxOrder
-from hydraulic_sysid.metrics import best_fit
-from hydraulic_sysid.records import Record
-from hydraulic_sysid.resampling import held_average
+from hydraulic_sysid.linear.identification import Settings, identify_model
+from hydraulic_sysid.linear.models import Arx, ArxOrder
 
 RATE, SECONDS = 500.0, 12.0
 MODEL = "moog_mcr_m_1002_bench"

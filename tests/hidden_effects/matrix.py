@@ -38,9 +38,9 @@ def examine(bench: benches.Bench, reference: bool = True) -> dict[str, Any]:
     """Make the bench, let it be diagnosed, and (``reference``) measure on records that the diagnosis never saw how
     far it came, beside the true structure."""
     from hydraulic_sim.model_file import load_model
-    from hydraulic_sysid.diagnose import diagnose
-    from hydraulic_sysid.records import read_all
-    from hydraulic_sysid.results import plain
+    from hydraulic_sysid.data.records import read_all
+    from hydraulic_sysid.data.results import plain
+    from hydraulic_sysid.diagnosis.search import diagnose
 
     with tempfile.TemporaryDirectory() as scratch:
         place = benches.write(bench, Path(scratch))
@@ -74,8 +74,8 @@ def held_out_ratio(bench: benches.Bench, model: Any, after: Any, records: Any, f
     The plant's dry friction has bristles, so `presliding` belongs to the true structure of every bench. Its fit
     begins at the true values.
     """
-    from hydraulic_sysid.calibrate import calibrate
-    from hydraulic_sysid.calibrate.estimate import evaluate
+    from hydraulic_sysid.diagnosis.calibrate import calibrate
+    from hydraulic_sysid.estimation.estimate import evaluate
 
     true = model
     truth = bench.truth()

@@ -9,8 +9,8 @@ import pytest
 
 from hidden_effects import benches, scoring
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.diagnose import diagnose
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.diagnosis.search import diagnose
 
 RIGHT_FIRST = (
     benches.Bench("single", ("coulomb_friction",), "strong", 1),

@@ -10,8 +10,8 @@ import pytest
 
 from hidden_effects import axis
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.diagnose import diagnose
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.diagnosis.search import diagnose
 
 MEASURED = os.environ.get("EMPS_DATA", "")  # DATA_EMPS.mat of the nonlinear benchmark
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import dlsim, freqz, lfilter
 
-from hydraulic_sysid.linear_models import ArxOrder, IdentificationError, fit_arx, fit_arx_instruments
+from hydraulic_sysid.linear.models import ArxOrder, IdentificationError, fit_arx, fit_arx_instruments
 
 A = np.array([-1.5, 0.7, -0.05])
 B = np.array([0.4, -0.2, 0.1])

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
-from hydraulic_sysid.bag import cdr
+from hydraulic_sysid.data.bag import cdr
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 JOINTS, PRESSURE, STRING = "sensor_msgs/msg/JointState", "sensor_msgs/msg/FluidPressure", "std_msgs/msg/String"

@@ -14,9 +14,9 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 from hydraulic_interfaces.contract import topic
-from hydraulic_sysid.bag import BagTopic, BagWriter, message_type, offered_qos, recover
-from hydraulic_sysid.bag.types import typestore
-from hydraulic_sysid.records.errors import BagError
+from hydraulic_sysid.data.bag import BagTopic, BagWriter, message_type, offered_qos, recover
+from hydraulic_sysid.data.bag.types import typestore
+from hydraulic_sysid.data.errors import BagError
 from hydraulic_sysid.verbs import recover as verb
 
 START = 1_700_000_000 * 10**9

@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from ruamel.yaml import YAML
 
 from hydraulic_interfaces.contract import TOPICS, topic
-from hydraulic_sysid.bag import (
+from hydraulic_sysid.data.bag import (
     BagTopic,
     BagWriter,
     ExperimentLog,
@@ -23,9 +23,9 @@ from hydraulic_sysid.bag import (
     offered_qos,
     recover,
 )
-from hydraulic_sysid.bag.continuity import Continuity
-from hydraulic_sysid.bag.types import header_stamp, typestore
-from hydraulic_sysid.records.errors import BagError
+from hydraulic_sysid.data.bag.continuity import Continuity
+from hydraulic_sysid.data.bag.types import header_stamp, typestore
+from hydraulic_sysid.data.errors import BagError
 
 SECOND = 10**9
 START = 1_700_000_000 * SECOND

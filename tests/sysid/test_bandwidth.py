@@ -11,9 +11,9 @@ import pytest
 from hydraulic_sim.linear import closed_form
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.__main__ import main
-from hydraulic_sysid.bandwidth import BandwidthError, from_model, from_record, from_rehearsal, from_response
+from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import load_plan
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.linear.bandwidth import BandwidthError, from_model, from_record, from_rehearsal, from_response
 
 BENCH = "moog_mcr_m_1002_bench"
 

@@ -18,11 +18,11 @@ from scipy.integrate import solve_ivp
 from hydraulic_sim.errors import ModelError
 from hydraulic_sim.model import Entry, Model
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sysid.calibrate import CalibrationError, Settings, calibrate
-from hydraulic_sysid.noise import noise_floor, robust_noise_floor
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.results import plain
+from hydraulic_sysid.diagnosis.calibrate import CalibrationError, Settings, calibrate
+from hydraulic_sysid.estimation.noise import noise_floor, robust_noise_floor
 from hydraulic_sysid.report import calibrate_figures, render
-from hydraulic_sysid.results import plain
 from hydraulic_sysid.verbs import calibrate as verb
 
 Array = NDArray[np.float64]

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from hydraulic_sim.errors import ModelError
-from hydraulic_sysid import cli
 from hydraulic_sysid.__main__ import main, summary, verb_names
-from hydraulic_sysid.records import RecordError
+from hydraulic_sysid.data.records import RecordError
+from hydraulic_sysid.verbs import _cli as cli
 
 
 def run(action: object, *arguments: str) -> int:

@@ -11,12 +11,12 @@ import pytest
 
 from hydraulic_sim.model_file import Model, load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.compare import ComparisonError, Settings, compare
-from hydraulic_sysid.compare.channels import VelocityFilter
-from hydraulic_sysid.compare.errormaps import Binning, error_map, folds_of, independent_samples
-from hydraulic_sysid.compare.spectra import amplitude_density, noise_density
-from hydraulic_sysid.decimation import envelope
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.data.decimation import envelope
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.compare import ComparisonError, Settings, compare
+from hydraulic_sysid.diagnosis.compare.errormaps import Binning, error_map, folds_of, independent_samples
+from hydraulic_sysid.diagnosis.compare.spectra import amplitude_density, noise_density
+from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
 
 DT = 1e-3
 NOISE = {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}

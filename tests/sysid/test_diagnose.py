@@ -9,18 +9,18 @@ import pytest
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.calibrate.estimate import scale
-from hydraulic_sysid.diagnose import DiagnosisError, add, diagnose, verdict
-from hydraulic_sysid.diagnose.anchor import SCATTER, bounded
-from hydraulic_sysid.diagnose.candidates import Hints, between, candidates, inverse, probes
-from hydraulic_sysid.diagnose.hints import spectral_lines
-from hydraulic_sysid.diagnose.levels import Level, material, repaired
-from hydraulic_sysid.diagnose.pieces import split
-from hydraulic_sysid.diagnose.screen import Prospect
-from hydraulic_sysid.diagnose.search import Found, Stage, Trial, _mends_a_law, _unrivalled, _varied
-from hydraulic_sysid.diagnose.shapes import FILES
-from hydraulic_sysid.noise import code_step
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict
+from hydraulic_sysid.diagnosis.search.anchor import SCATTER, bounded
+from hydraulic_sysid.diagnosis.search.candidates import Hints, between, candidates, inverse, probes
+from hydraulic_sysid.diagnosis.search.hints import spectral_lines
+from hydraulic_sysid.diagnosis.search.levels import Level, material, repaired
+from hydraulic_sysid.diagnosis.search.pieces import split
+from hydraulic_sysid.diagnosis.search.screen import Prospect
+from hydraulic_sysid.diagnosis.search.search import Found, Stage, Trial, _mends_a_law, _unrivalled, _varied
+from hydraulic_sysid.diagnosis.search.shapes import FILES
+from hydraulic_sysid.estimation.estimate import scale
+from hydraulic_sysid.estimation.noise import code_step
 
 DT = 1e-3
 

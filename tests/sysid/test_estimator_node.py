@@ -17,8 +17,8 @@ pytest.importorskip("rclpy")
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue  # noqa: E402
 
 from hydraulic_interfaces.conversions import from_time, sample_from_messages  # noqa: E402
-from hydraulic_sysid.linear_models import ArxOrder, read_linear_model  # noqa: E402
-from hydraulic_sysid.online import SlowSampler  # noqa: E402
+from hydraulic_sysid.linear.models import ArxOrder, read_linear_model  # noqa: E402
+from hydraulic_sysid.linear.online import SlowSampler  # noqa: E402
 
 NODE = "/actuator/estimator"
 PERIOD_NS = 20_000_000

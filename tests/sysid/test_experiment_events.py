@@ -9,7 +9,7 @@ from types import ModuleType
 import pytest
 
 from hydraulic_interfaces.contract import ABORTED, FINISHED, STARTED
-from hydraulic_sysid.bag import experiment
+from hydraulic_sysid.data.bag import experiment
 from hydraulic_sysid.excitation import Plan, events, session
 from hydraulic_sysid.excitation.run import ExcitationRun
 from hydraulic_sysid.excitation.signals.steps import Steps

@@ -11,18 +11,18 @@ import pytest
 from scipy import signal
 
 from hydraulic_sysid.__main__ import main
+from hydraulic_sysid.data.records import Record, save_csv
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.signals.odd_random_phase_multisine import OddRandomPhaseMultisine
 from hydraulic_sysid.excitation.signals.random_phase_multisine import RandomPhaseMultisine
-from hydraulic_sysid.frequency_response import (
+from hydraulic_sysid.linear.frequency_response import (
     FrequencyResponseError,
     best_linear_approximation,
     etfe,
     periods_of,
     welch,
 )
-from hydraulic_sysid.frequency_response.document import Settings, respond
-from hydraulic_sysid.records import Record, save_csv
+from hydraulic_sysid.linear.frequency_response.document import Settings, respond
 
 DT = 1e-3
 NUM, DEN = signal.butter(2, 20.0, fs=1.0 / DT)

@@ -10,11 +10,11 @@ import pytest
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid import results
-from hydraulic_sysid.grey_box import GreyBoxError, grey_box
-from hydraulic_sysid.grey_box.selection import select
-from hydraulic_sysid.grey_box.verdict import shares
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.grey_box import GreyBoxError, grey_box
+from hydraulic_sysid.diagnosis.grey_box.selection import select
+from hydraulic_sysid.diagnosis.grey_box.verdict import shares
 from hydraulic_sysid.verbs import greybox
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hydraulic_sysid.identification import Settings, identify
-from hydraulic_sysid.linear_models import Arx, ArxOrder, IdentificationError
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.linear.identification import Settings, identify
+from hydraulic_sysid.linear.models import Arx, ArxOrder, IdentificationError
 
 DT = 0.01
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hydraulic_sysid.linear_models import (
+from hydraulic_sysid.linear.models import (
     Arx,
     IdentificationError,
     StateSpace,

@@ -12,9 +12,9 @@ import pytest
 from hydraulic_sim.model import Entry, Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.locate import LocateError, locate
-from hydraulic_sysid.records import Record
-from hydraulic_sysid.results import plain
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.results import plain
+from hydraulic_sysid.diagnosis.locate import LocateError, locate
 
 DT = 1e-3
 NOISE = {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4, "spool": 5e-7, "pressure_supply": 1.5e4}

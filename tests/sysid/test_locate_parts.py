@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from hydraulic_sysid.locate.blame import PARAMETERS, rank
-from hydraulic_sysid.locate.curves import play, rate_limited, signed_knots, tents
-from hydraulic_sysid.locate.lines import common_lines, waves
-from hydraulic_sysid.locate.moments import FOLDS, Moments
-from hydraulic_sysid.locate.noise_model import ORDER, Whitener, thin
+from hydraulic_sysid.diagnosis.locate.blame import PARAMETERS, rank
+from hydraulic_sysid.diagnosis.locate.curves import play, rate_limited, signed_knots, tents
+from hydraulic_sysid.diagnosis.locate.lines import common_lines, waves
+from hydraulic_sysid.diagnosis.locate.moments import FOLDS, Moments
+from hydraulic_sysid.diagnosis.locate.noise_model import ORDER, Whitener, thin
 from hydraulic_sysid.verbs.locate import main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "sample_bench"

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from hydraulic_sysid import metrics
-from hydraulic_sysid.identification import Settings, identify
-from hydraulic_sysid.linear_models import Arx, ArxOrder, StateSpace, TransferFunction
-from hydraulic_sysid.nonlinear import fit_valve_actuator
-from hydraulic_sysid.records import read_records
+from hydraulic_sysid.data.records import read_records
+from hydraulic_sysid.diagnosis.grey_box.valve_actuator import fit_valve_actuator
+from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.linear.identification import Settings, identify
+from hydraulic_sysid.linear.models import Arx, ArxOrder, StateSpace, TransferFunction
 
 DATASETS = Path(os.environ.get("HYDRAULIC_DATASETS", "/nowhere"))
 pytestmark = pytest.mark.skipif(

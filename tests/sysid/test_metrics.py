@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hydraulic_sysid import metrics
-from hydraulic_sysid.noise import noise_floor, resolution
-from hydraulic_sysid.resampling import held_average, sampled
+from hydraulic_sysid.data.resampling import held_average, sampled
+from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.estimation.noise import noise_floor, resolution
 
 Y = [1.0, 2.0, 3.0, 4.0]
 P = [1.0, 2.0, 3.0, 6.0]

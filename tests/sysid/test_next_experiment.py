@@ -13,18 +13,18 @@ import pytest
 from hydraulic_sim.model import Entry, Model
 from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.calibrate.estimate import fit
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.results import plain
+from hydraulic_sysid.diagnosis.next_experiment import Limits, NextExperimentError, Proposal, limits_of, next_experiment
+from hydraulic_sysid.diagnosis.next_experiment.evidence import Point, as_record, evidence
+from hydraulic_sysid.diagnosis.next_experiment.movements import FAMILIES, Bench, Movement, every
+from hydraulic_sysid.diagnosis.next_experiment.reference import Leader, play
+from hydraulic_sysid.estimation.estimate import fit
 from hydraulic_sysid.excitation import Plan, load_plan
 from hydraulic_sysid.excitation.amplitude import largest
 from hydraulic_sysid.excitation.design import Wish, propose
 from hydraulic_sysid.excitation.rehearsal import Sensors, rehearse
-from hydraulic_sysid.next_experiment import Limits, NextExperimentError, Proposal, limits_of, next_experiment
-from hydraulic_sysid.next_experiment.evidence import Point, as_record, evidence
-from hydraulic_sysid.next_experiment.movements import FAMILIES, Bench, Movement, every
-from hydraulic_sysid.next_experiment.reference import Leader, play
-from hydraulic_sysid.records import Record
 from hydraulic_sysid.report import render
-from hydraulic_sysid.results import plain
 from hydraulic_sysid.verbs import next_experiment as verb
 
 NOISE = {"position": 2e-5}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hydraulic_sysid import metrics
-from hydraulic_sysid.linear_models import (
+from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.linear.models import (
     CRITERIA,
     Arx,
     ArxOrder,
@@ -18,8 +18,8 @@ from hydraulic_sysid.linear_models import (
     best,
     try_orders,
 )
-from hydraulic_sysid.linear_models.order_selection import information_criteria
-from hydraulic_sysid.linear_models.structures import fit_on_equal_samples
+from hydraulic_sysid.linear.models.order_selection import information_criteria
+from hydraulic_sysid.linear.models.structures import fit_on_equal_samples
 
 DEN, NUM = [1.0, -1.5, 0.7], [0.0, 0.0, 1.0, 0.5]
 

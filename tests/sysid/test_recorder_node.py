@@ -17,8 +17,8 @@ from hydraulic_interfaces.contract import absolute, find_topic, topic  # noqa: E
 from hydraulic_interfaces.conversions import StateEncoder, interface_class  # noqa: E402
 from hydraulic_interfaces.qos import profile  # noqa: E402
 from hydraulic_interfaces.samples import PlantSample  # noqa: E402
-from hydraulic_sysid.bag import recover  # noqa: E402
-from hydraulic_sysid.bag.types import typestore  # noqa: E402
+from hydraulic_sysid.data.bag import recover  # noqa: E402
+from hydraulic_sysid.data.bag.types import typestore  # noqa: E402
 
 NODE = "hydraulic_sysid.nodes.recorder"
 SOURCE = Path(__file__).parent / "recorder_source.py"

@@ -12,7 +12,7 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from hydraulic_sysid.records import BagError, RecordError, TimeError, read_records
+from hydraulic_sysid.data.records import BagError, RecordError, TimeError, read_records
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 JOINTS, PRESSURE, STRING = "sensor_msgs/msg/JointState", "sensor_msgs/msg/FluidPressure", "std_msgs/msg/String"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hydraulic_sysid.records import ColumnMapError, RecordError, load_column_map, parse_column_map, read_records
+from hydraulic_sysid.data.records import ColumnMapError, RecordError, load_column_map, parse_column_map, read_records
 
 BASE: dict[str, object] = {"time": {"dt": 0.1}, "channels": {"drive": {"column": 1, "unit": "V"}}}
 

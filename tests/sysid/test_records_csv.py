@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hydraulic_sysid.records import (
+from hydraulic_sysid.data.records import (
     ColumnMap,
     FileError,
     Record,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from hydraulic_sysid.records import CHANNELS, FileError, RecordError, load_column_map, read_records, shipped_maps
+from hydraulic_sysid.data.records import CHANNELS, FileError, RecordError, load_column_map, read_records, shipped_maps
 
 SAMPLES = 40
 

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hydraulic_sysid.records import CHANNELS, ColumnMapError, RecordError, parse_column_map, read_records
+from hydraulic_sysid.data.records import CHANNELS, ColumnMapError, RecordError, parse_column_map, read_records
 
 
 def write(path: Path, content: str | bytes) -> Path:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hydraulic_sysid.records import ChannelError, Record, RecordError
+from hydraulic_sysid.data.records import ChannelError, Record, RecordError
 
 
 def record(count: int = 1000, dt: float = 0.001) -> Record:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hydraulic_sysid.records.sampling import IrregularTimeError, gaps, sampling
+from hydraulic_sysid.data.records.sampling import IrregularTimeError, gaps, sampling
 
 
 @pytest.mark.parametrize("dt", [0.001, 0.02, 1 / 4096, 1 / 3000, 1.0, 0.0025, 1e-6])

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hydraulic_sysid.records import Record, RecordError, read_records, save_csv, to_bag
+from hydraulic_sysid.data.records import Record, RecordError, read_records, save_csv, to_bag
 
 
 def assert_same(one: Sequence[Record], other: Sequence[Record]) -> None:

@@ -9,10 +9,10 @@ from scipy.signal import lfilter
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid import metrics
-from hydraulic_sysid.linear_models import ArxOrder, IdentificationError, RecursiveArx, fit_arx
-from hydraulic_sysid.online import LiveModel, RunningFit, SlowSampler
-from hydraulic_sysid.resampling import held_average, sampled
+from hydraulic_sysid.data.resampling import held_average, sampled
+from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.linear.models import ArxOrder, IdentificationError, RecursiveArx, fit_arx
+from hydraulic_sysid.linear.online import LiveModel, RunningFit, SlowSampler
 
 ORDER = ArxOrder(2, 2, 1)
 FIRST, SECOND = ([1.0, -1.5, 0.7], [0.0, 1.0, 0.5]), ([1.0, -1.2, 0.5], [0.0, 0.6, 0.9])

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid import results
-from hydraulic_sysid.compare import compare
-from hydraulic_sysid.identification import identify
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.diagnosis.compare import compare
+from hydraulic_sysid.linear.identification import identify
 from hydraulic_sysid.report import compare_figures, identify_figures, render, write_page
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"

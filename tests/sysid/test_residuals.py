@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hydraulic_sysid.validation import residual_tests
+from hydraulic_sysid.linear.validation import residual_tests
 
 
 def white(n: int, seed: int) -> np.ndarray:

@@ -7,9 +7,9 @@ import pytest
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.linear_models import fit_transfer_function
-from hydraulic_sysid.records import Record
-from hydraulic_sysid.validation import SHAPES, Grid, periodic, records_rmse, rmse_grid
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.linear.models import fit_transfer_function
+from hydraulic_sysid.linear.validation import SHAPES, Grid, periodic, records_rmse, rmse_grid
 
 
 @pytest.mark.parametrize("shape", SHAPES)

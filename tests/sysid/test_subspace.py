@@ -9,8 +9,8 @@ from scipy.linalg import solve_discrete_are
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid import metrics
-from hydraulic_sysid.linear_models import IdentificationError, fit_state_space
+from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.linear.models import IdentificationError, fit_state_space
 
 # P. Van Overschee, B. De Moor, Subspace Identification for Linear Systems, Kluwer 1996: the system of the tutorial
 # example that comes with the book (first input and output), poles at ±0.603 ± 0.603i.

@@ -9,8 +9,8 @@ from scipy import signal
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid import metrics
-from hydraulic_sysid.linear_models import (
+from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.linear.models import (
     IdentificationError,
     TransferFunctionModel,
     TransferFunctionOrder,
@@ -136,7 +136,7 @@ def bench() -> Plant:
 
 @pytest.mark.parametrize("dt_model", [0.001, 0.05])
 def test_the_nonlinear_plant_is_fitted_on_held_out_data(bench: Plant, dt_model: float) -> None:
-    from hydraulic_sysid.resampling import held_average, sampled
+    from hydraulic_sysid.data.resampling import held_average, sampled
 
     u = three_tones(50_000, 1e-3, 1.5, 2.0)
     y = bench.simulate(u, 1e-3)["position"] + 1e-4 * np.random.default_rng(6).standard_normal(u.size)

@@ -10,12 +10,12 @@ import pytest
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid import results
-from hydraulic_sysid.linear_models import Arx, ArxOrder, TransferFunction, write_linear_model
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.linear.models import Arx, ArxOrder, TransferFunction, write_linear_model
+from hydraulic_sysid.linear.validation import Grid
+from hydraulic_sysid.linear.validation.validate import Subject, validate
 from hydraulic_sysid.report import render
-from hydraulic_sysid.validation import Grid
-from hydraulic_sysid.validation.validate import Subject, validate
 from hydraulic_sysid.verbs import validate as verb
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
@@ -86,7 +86,7 @@ def test_what_cannot_be_validated_says_why(
 
 
 def test_models_of_other_channels_are_not_mixed(files: list[str]) -> None:
-    from hydraulic_sysid.linear_models import IdentificationError, read_linear_model
+    from hydraulic_sysid.linear.models import IdentificationError, read_linear_model
 
     model, _ = read_linear_model(Path(files[0]))
     drive, other = Subject(model, "a"), Subject(model, "b", output="pressure_a", unit="Pa")

@@ -19,10 +19,10 @@ from hydraulic_can_driver.virtual import VirtualBench
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.estimation.metrics import best_fit
 from hydraulic_sysid.excitation.signals.random_phase_multisine import RandomPhaseMultisine
-from hydraulic_sysid.identification import Settings, identify_model
-from hydraulic_sysid.metrics import best_fit
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.linear.identification import Settings, identify_model
 
 RATE, SECONDS = 500.0, 16.0
 MODEL = load_model(Path(str(resources.files("hydraulic_bringup.demo") / "models" / "as_built.yaml")))

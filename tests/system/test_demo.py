@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hydraulic_sysid.records import Record, read_records
+from hydraulic_sysid.data.records import Record, read_records
 
 pytest.importorskip("rclpy")
 

@@ -12,8 +12,8 @@ from system.test_demo import Demo, Finished, finished
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.metrics import best_fit
-from hydraulic_sysid.records import read_records
+from hydraulic_sysid.data.records import read_records
+from hydraulic_sysid.estimation.metrics import best_fit
 
 pytest.importorskip("rclpy")
 pytestmark = pytest.mark.timeout(240)

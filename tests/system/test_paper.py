@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
+from hydraulic_sysid.data.records import read_records
 from hydraulic_sysid.excitation import load_plan
-from hydraulic_sysid.records import read_records
 
 pytest.importorskip("rclpy")
 

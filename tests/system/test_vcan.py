@@ -21,9 +21,9 @@ from ruamel.yaml import YAML
 from system import vcan
 from system.vcan_guest import GAIN, LAG, START
 
-from hydraulic_sysid.linear_models import ArxOrder, fit_arx
-from hydraulic_sysid.metrics import best_fit
-from hydraulic_sysid.records import read_records
+from hydraulic_sysid.data.records import read_records
+from hydraulic_sysid.estimation.metrics import best_fit
+from hydraulic_sysid.linear.models import ArxOrder, fit_arx
 
 pytest.importorskip("rclpy")
 

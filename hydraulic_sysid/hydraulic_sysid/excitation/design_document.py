@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from hydraulic_sysid.decimation import trace
-from hydraulic_sysid.display import number, quantity
+from hydraulic_sysid.data.decimation import trace
+from hydraulic_sysid.data.display import number, quantity
+from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.excitation.amplitude import Limits, Sized
 from hydraulic_sysid.excitation.crest import crest_factor
-from hydraulic_sysid.results import heading
 
 _SHOWN = ("drive", "position", "velocity", "pressure_a", "pressure_b")
 _LINES = 400

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import STARTED
 from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation.plan import Plan
 from hydraulic_sysid.excitation.prediction import Prediction
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
-from hydraulic_sysid.records import Record
 
 Array = NDArray[np.float64]
 

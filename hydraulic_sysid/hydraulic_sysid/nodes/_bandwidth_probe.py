@@ -64,9 +64,9 @@ class BandwidthProbe:
 def _found(plan: Plan, rows: list[tuple[int, float, float]]) -> dict[str, object]:
     """What the samples (stamp [ns], drive [V], position [m]) of a whole probe tell."""
     # Only here: they take longer to load than the node has to start.
-    from hydraulic_sysid.bandwidth import document, from_record
-    from hydraulic_sysid.records import Record
-    from hydraulic_sysid.results import plain
+    from hydraulic_sysid.data.records import Record
+    from hydraulic_sysid.data.results import plain
+    from hydraulic_sysid.linear.bandwidth import document, from_record
 
     stamps = np.array([row[0] for row in rows], dtype=np.int64)
     values = np.array([row[1:] for row in rows], dtype=float)

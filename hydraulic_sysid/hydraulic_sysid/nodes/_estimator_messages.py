@@ -8,8 +8,8 @@ from std_msgs.msg import Header
 
 from hydraulic_interfaces.contract import ESTIMATOR_NODE, absolute
 from hydraulic_interfaces.conversions import to_time
-from hydraulic_sysid.linear_models.recursive import RecursiveArx, Step
-from hydraulic_sysid.online import RunningFit
+from hydraulic_sysid.linear.models.recursive import RecursiveArx, Step
+from hydraulic_sysid.linear.online import RunningFit
 
 
 def parameters(estimate: RecursiveArx, stamp_ns: int) -> JointState:

@@ -8,7 +8,7 @@ from rclpy.node import Node
 from hydraulic_interfaces.contract import topic
 from hydraulic_interfaces.conversions import to_time
 from hydraulic_interfaces.qos import profile
-from hydraulic_sysid.bag import Recording
+from hydraulic_sysid.data.bag import Recording
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 # Ten seconds of the five streams at 1 kHz: the disk is not keeping up.

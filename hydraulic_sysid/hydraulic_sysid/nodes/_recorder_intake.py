@@ -11,9 +11,9 @@ from hydraulic_interfaces.contract import TOPICS, Topic, absolute, topic
 from hydraulic_interfaces.conversions import interface_class
 from hydraulic_interfaces.nodes.mailbox import Mailbox
 from hydraulic_interfaces.qos import profile
-from hydraulic_sysid.bag import BagTopic, ExperimentLog, Recording, message_type, offered_qos
-from hydraulic_sysid.bag.continuity import Continuity
-from hydraulic_sysid.bag.types import header_stamp
+from hydraulic_sysid.data.bag import BagTopic, ExperimentLog, Recording, message_type, offered_qos
+from hydraulic_sysid.data.bag.continuity import Continuity
+from hydraulic_sysid.data.bag.types import header_stamp
 
 # Messages of a topic that wait while this process is held up: five seconds at 1 kHz.
 _DEPTH = 5000

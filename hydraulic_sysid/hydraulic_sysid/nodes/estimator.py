@@ -24,9 +24,9 @@ from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.qos import STREAM_HISTORY, profile
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.linear_models import ArxOrder, IdentificationError
+from hydraulic_sysid.linear.models import ArxOrder, IdentificationError
+from hydraulic_sysid.linear.online import LiveModel, RunningArx
 from hydraulic_sysid.nodes import _estimator_messages as messages
-from hydraulic_sysid.online import LiveModel, RunningArx
 
 PARAMETERS = (
     ParameterSpec("model", "moog_mcr_m_1002_bench", "model file or preset run beside the plant; empty: none"),

@@ -28,7 +28,7 @@ from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.nodes.parameters import ParameterTable
 from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.qos import profile
-from hydraulic_sysid.bag import Recording, StopRule
+from hydraulic_sysid.data.bag import Recording, StopRule
 from hydraulic_sysid.nodes._recorder_health import RecorderHealth
 from hydraulic_sysid.nodes._recorder_intake import Intake
 

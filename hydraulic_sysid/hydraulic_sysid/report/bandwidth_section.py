@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from hydraulic_sysid.display import number
+from hydraulic_sysid.data.display import number
 
 from . import style
 from .html import Figures, made_on, section, tag, text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_sysid.display import TITLES, first_upper, number, quantity
+from hydraulic_sysid.data.display import TITLES, first_upper, number, quantity
 
 from . import calibrate_figures as figures
 from .html import Figures, choice, made_on, section, table, tag, text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hydraulic_sysid.display import first_upper, number, percent, quantity
+from hydraulic_sysid.data.display import first_upper, number, percent, quantity
 
 from . import compare_figures as figures
 from .html import Figures, choice, made_on, more, section, table, tag, text

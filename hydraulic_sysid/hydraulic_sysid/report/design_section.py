@@ -7,7 +7,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from hydraulic_sysid.display import TITLES, number, quantity
+from hydraulic_sysid.data.display import TITLES, number, quantity
 
 from . import style
 from .html import Figures, choice, made_on, section, table, tag, text

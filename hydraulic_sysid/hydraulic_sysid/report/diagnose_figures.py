@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from hydraulic_sysid.display import TITLES, number
+from hydraulic_sysid.data.display import TITLES, number
 
 from . import style
 from .style import Panels

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_sysid.display import TITLES, first_upper, number, percent, quantity
+from hydraulic_sysid.data.display import TITLES, first_upper, number, percent, quantity
 
 from . import diagnose_figures as figures
 from .html import Figures, choice, made_on, more, section, table, tag, text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_sysid.display import number
+from hydraulic_sysid.data.display import number
 
 from . import frequency_response_figures as figures
 from .html import Figures, made_on, section, table, tag, text

@@ -6,7 +6,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from hydraulic_sysid.display import first_upper, percent, quantity
+from hydraulic_sysid.data.display import first_upper, percent, quantity
 
 from . import style
 from .html import Figures, choice, made_on, section, table, tag, text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_sysid.display import first_upper, number, percent, quantity
+from hydraulic_sysid.data.display import first_upper, number, percent, quantity
 
 from . import compare_figures
 from . import locate_figures as figures

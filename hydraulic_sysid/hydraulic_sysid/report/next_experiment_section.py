@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from hydraulic_sysid.display import TITLES, first_upper, number, quantity, span
+from hydraulic_sysid.data.display import TITLES, first_upper, number, quantity, span
 
 from . import style
 from .html import Figures, choice, made_on, more, section, table, tag, text

@@ -9,7 +9,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
-from hydraulic_sysid.results import PAGE, PAGE_MARK, ResultError, verb_of, write_text
+from hydraulic_sysid.data.results import PAGE, PAGE_MARK, ResultError, verb_of, write_text
 
 from . import (
     bandwidth_section,

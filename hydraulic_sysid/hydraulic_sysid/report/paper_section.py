@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_sysid.display import number, quantity, span
+from hydraulic_sysid.data.display import number, quantity, span
 
 from . import paper_figures as figures
 from .html import Figures, choice, made_on, section, table, tag, text

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from hydraulic_sysid.display import SHOWN
+from hydraulic_sysid.data.display import SHOWN
 
 Array = NDArray[np.float32]
 

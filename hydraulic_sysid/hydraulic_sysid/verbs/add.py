@@ -12,10 +12,11 @@ from rich.console import Console
 
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.calibrate import Settings
-from hydraulic_sysid.diagnose import DiagnosisError, add
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.diagnosis.calibrate import Settings
+from hydraulic_sysid.diagnosis.search import DiagnosisError, add
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import summary_json
 from .diagnose import LONG, MODEL, add_diagnosis_options, check_target, show

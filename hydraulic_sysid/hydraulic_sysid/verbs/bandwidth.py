@@ -16,10 +16,12 @@ from rich.table import Table
 
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid import bandwidth, cli, results
-from hydraulic_sysid.display import number
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import number
+from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.excitation import load_plan
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.linear import bandwidth
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, summary_json
 

@@ -16,9 +16,10 @@ from rich.table import Table
 
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.calibrate import CalibrationError, Settings, calibrate
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.diagnosis.calibrate import CalibrationError, Settings, calibrate
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, add_window_option, read_window, summary_json
 

@@ -16,11 +16,12 @@ from rich.table import Table
 
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.compare import ComparisonError, Settings, compare
-from hydraulic_sysid.compare.findings import AT_FLOOR
-from hydraulic_sysid.display import first_upper, number, quantity
-from hydraulic_sysid.records import Record, read_all
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import first_upper, number, quantity
+from hydraulic_sysid.data.records import Record, read_all
+from hydraulic_sysid.diagnosis.compare import ComparisonError, Settings, compare
+from hydraulic_sysid.diagnosis.compare.findings import AT_FLOOR
+from hydraulic_sysid.verbs import _cli as cli
 
 EPILOG = """\
 examples:

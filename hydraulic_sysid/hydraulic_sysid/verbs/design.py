@@ -16,13 +16,14 @@ from rich.table import Table
 
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import Model, load_model
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.bandwidth import from_model, from_rehearsal
-from hydraulic_sysid.display import quantity, span
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import quantity, span
 from hydraulic_sysid.excitation import ExcitationError, load_plan, save_plan
 from hydraulic_sysid.excitation.amplitude import Limits, Sized, largest
 from hydraulic_sysid.excitation.design import SIGNALS, Wish, propose
 from hydraulic_sysid.excitation.design_document import document
+from hydraulic_sysid.linear.bandwidth import from_model, from_rehearsal
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, summary_json
 

@@ -14,9 +14,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.display import number
-from hydraulic_sysid.frequency_response.document import METHODS, Settings, respond
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import number
+from hydraulic_sysid.linear.frequency_response.document import METHODS, Settings, respond
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, add_window_option, read_window, summary_json
 

@@ -16,11 +16,12 @@ from rich.table import Table
 
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.compare import ComparisonError
-from hydraulic_sysid.display import first_upper, percent, quantity
-from hydraulic_sysid.grey_box import GreyBoxError, grey_box
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import first_upper, percent, quantity
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.diagnosis.compare import ComparisonError
+from hydraulic_sysid.diagnosis.grey_box import GreyBoxError, grey_box
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, add_window_option, read_window, summary_json
 

@@ -16,9 +16,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from hydraulic_sysid import cli, identification, results
-from hydraulic_sysid.display import SHOWN, number
-from hydraulic_sysid.linear_models import (
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import SHOWN, number
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.linear import identification
+from hydraulic_sysid.linear.models import (
     CRITERIA,
     OFFSETS,
     Arx,
@@ -30,8 +32,8 @@ from hydraulic_sysid.linear_models import (
     TransferFunctionOrder,
     write_linear_model,
 )
-from hydraulic_sysid.linear_models.model_file import check_place
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.linear.models.model_file import check_place
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, add_window_option, read_window, summary_json
 

@@ -16,9 +16,10 @@ from rich.table import Table
 
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.display import first_upper, number, percent, quantity
-from hydraulic_sysid.locate import LocateError, locate
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import first_upper, number, percent, quantity
+from hydraulic_sysid.diagnosis.locate import LocateError, locate
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, add_window_option, read_window, summary_json
 

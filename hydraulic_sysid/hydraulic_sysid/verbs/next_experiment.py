@@ -18,13 +18,14 @@ from rich.table import Table
 
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import Model, load_model
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.calibrate import CalibrationError
-from hydraulic_sysid.calibrate.segments import MEASURED
-from hydraulic_sysid.display import number, span
-from hydraulic_sysid.next_experiment import NextExperimentError, limits_of, next_experiment
-from hydraulic_sysid.noise import noise_floor
-from hydraulic_sysid.records import read_all
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import number, span
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.diagnosis.calibrate import CalibrationError
+from hydraulic_sysid.diagnosis.next_experiment import NextExperimentError, limits_of, next_experiment
+from hydraulic_sysid.estimation.noise import noise_floor
+from hydraulic_sysid.estimation.segments import MEASURED
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, summary_json
 from .design import _LIMITS

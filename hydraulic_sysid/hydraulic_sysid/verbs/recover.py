@@ -11,8 +11,8 @@ import json
 import sys
 from pathlib import Path
 
-from hydraulic_sysid import cli
-from hydraulic_sysid.bag import Recovery, recover
+from hydraulic_sysid.data.bag import Recovery, recover
+from hydraulic_sysid.verbs import _cli as cli
 
 EPILOG = """\
 examples:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from hydraulic_sysid import cli, results
+from hydraulic_sysid.data import results
+from hydraulic_sysid.verbs import _cli as cli
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -17,12 +17,13 @@ from rich.table import Table
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid import cli, results
-from hydraulic_sysid.display import SHOWN, number
-from hydraulic_sysid.linear_models import IdentificationError, read_linear_model
-from hydraulic_sysid.records import read_all
-from hydraulic_sysid.validation import SHAPES, Grid
-from hydraulic_sysid.validation.validate import Subject, validate
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import SHOWN, number
+from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.linear.models import IdentificationError, read_linear_model
+from hydraulic_sysid.linear.validation import SHAPES, Grid
+from hydraulic_sysid.linear.validation.validate import Subject, validate
+from hydraulic_sysid.verbs import _cli as cli
 
 from .compare import add_folder_options, summary_json
 

@@ -9,11 +9,12 @@ from typing import Any
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import save_model
-from hydraulic_sysid import identification, results
-from hydraulic_sysid.compare import ComparisonError, Settings, compare
-from hydraulic_sysid.diagnose import DiagnosisError, diagnose
-from hydraulic_sysid.linear_models import IdentificationError
-from hydraulic_sysid.records import Record, RecordError, TimeError, read_records
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.records import Record, RecordError, TimeError, read_records
+from hydraulic_sysid.diagnosis.compare import ComparisonError, Settings, compare
+from hydraulic_sysid.diagnosis.search import DiagnosisError, diagnose
+from hydraulic_sysid.linear import identification
+from hydraulic_sysid.linear.models import IdentificationError
 from hydraulic_sysid.report import write_page
 
 from .errors import DemoError

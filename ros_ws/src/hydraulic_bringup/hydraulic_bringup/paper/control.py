@@ -12,8 +12,8 @@ from hydraulic_control import evaluation, gains_file, paper
 from hydraulic_control.identified import load_identified
 from hydraulic_control.simulation import SensorNoise
 from hydraulic_sim.model import Model
-from hydraulic_sysid.identification import about
-from hydraulic_sysid.linear_models.model_file import write_linear_model
+from hydraulic_sysid.linear.identification import about
+from hydraulic_sysid.linear.models.model_file import write_linear_model
 
 GAINS = "npid"
 STEP_M = 0.05

@@ -9,12 +9,12 @@ import numpy as np
 
 from hydraulic_bringup.paper import printed, study
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.bandwidth import Bandwidth
-from hydraulic_sysid.decimation import trace
-from hydraulic_sysid.records import Record
-from hydraulic_sysid.results import heading
-from hydraulic_sysid.validation import records_rmse, rmse_grid
-from hydraulic_sysid.validation.rmse_grid import errors
+from hydraulic_sysid.data.decimation import trace
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.results import heading
+from hydraulic_sysid.linear.bandwidth import Bandwidth
+from hydraulic_sysid.linear.validation import records_rmse, rmse_grid
+from hydraulic_sysid.linear.validation.rmse_grid import errors
 
 _MM2 = 1e6
 _FIT_PLACES = 2  # decimals of the paper's best fits

@@ -9,9 +9,9 @@ from hydraulic_bringup.demo import offline, online
 from hydraulic_bringup.demo.online import Experiment, Steps
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import Plan, save_plan
 from hydraulic_sysid.excitation.rehearsal import Sensors, rehearse
-from hydraulic_sysid.records import Record
 
 SENSORS = Sensors(
     position_noise=online.SENSORS["position_noise"],

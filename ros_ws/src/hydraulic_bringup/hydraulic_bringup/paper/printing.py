@@ -8,7 +8,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from hydraulic_sysid.display import number
+from hydraulic_sysid.data.display import number
 
 
 def show(result: dict[str, Any], console: Console) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hydraulic_sim.model import Model
+from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import Plan, Signal
 from hydraulic_sysid.excitation.amplitude import largest
 from hydraulic_sysid.excitation.design import Wish, propose
@@ -15,11 +16,10 @@ from hydraulic_sysid.excitation.signals.sawtooth import Sawtooth
 from hydraulic_sysid.excitation.signals.sine import Sine
 from hydraulic_sysid.excitation.signals.square import Square
 from hydraulic_sysid.excitation.signals.triangle import Triangle
-from hydraulic_sysid.identification import Settings, identify_model
-from hydraulic_sysid.linear_models import LinearModel, TransferFunctionOrder
-from hydraulic_sysid.linear_models.structures import Arx, TransferFunction
-from hydraulic_sysid.records import Record
-from hydraulic_sysid.validation import Grid
+from hydraulic_sysid.linear.identification import Settings, identify_model
+from hydraulic_sysid.linear.models import LinearModel, TransferFunctionOrder
+from hydraulic_sysid.linear.models.structures import Arx, TransferFunction
+from hydraulic_sysid.linear.validation import Grid
 
 BANDS = {"in": (0.1, 2.0), "below": (0.01, 0.1), "above": (2.0, 20.0)}
 """Parts of the bandwidth: the paper's band, and a decade on either side of it."""

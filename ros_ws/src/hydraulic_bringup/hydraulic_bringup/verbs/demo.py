@@ -23,9 +23,9 @@ from hydraulic_bringup.demo import offline, online
 from hydraulic_bringup.demo.errors import DemoError
 from hydraulic_sim.errors import HydraulicSimError
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.display import number, quantity
+from hydraulic_sysid.data.display import number, quantity
+from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.errors import HydraulicSysidError
-from hydraulic_sysid.records import read_all
 
 DATA_SHEET = "moog_mcr_m_1002_bench"
 RUNS = Path("runs")

@@ -28,12 +28,12 @@ from hydraulic_control.errors import HydraulicControlError
 from hydraulic_sim.errors import HydraulicSimError
 from hydraulic_sim.model_file import load_model, presets
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid import results
-from hydraulic_sysid.bandwidth import Bandwidth, BandwidthError, from_model, from_record
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.errors import HydraulicSysidError
 from hydraulic_sysid.excitation import Plan, load_plan
-from hydraulic_sysid.linear_models import IdentificationError
-from hydraulic_sysid.records import Record
+from hydraulic_sysid.linear.bandwidth import Bandwidth, BandwidthError, from_model, from_record
+from hydraulic_sysid.linear.models import IdentificationError
 from hydraulic_sysid.report import write_page
 
 DEFAULT = "moog_mcr_m_1002_bench"

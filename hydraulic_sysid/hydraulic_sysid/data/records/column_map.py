@@ -1,0 +1,239 @@
+"""Column maps: which column of a CSV or MAT file is which channel, in which unit and with which sign.
+
+A map is a YAML file::
+
+    time: {column: t, unit: s}           # or {dt: 0.02}; irregular: error | resample | split
+    channels:
+      drive: {column: u, unit: V}        # by its name in the header (MAT: the variable) …
+      position: {column: 3, unit: mm, scale: 20.0, offset: -100.0, sign: -1}    # … or its number, from 1
+      pressure_b: null                   # absent, as a channel that is not named
+    extra:
+      speed_signal: {column: 4, unit: V} # a channel of its own, for which no SI unit is known
+    header: false                        # header, delimiter and decimal are found out where they are left out
+    notes: Where the numbers come from.
+
+``records: {left: {…}, right: {…}}`` in place of ``channels`` makes several records of one file. A map with neither
+these nor ``extra`` leaves it to the headers to name the channels, and says the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from hydraulic_sysid.data.errors import ColumnMapError
+from hydraulic_sysid.data.records.channels import CHANNELS, TIME, allowed
+from hydraulic_sysid.data.records.units import si_unit, to_si
+
+IRREGULAR = ("error", "resample", "split")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: SI value = to_SI(sign · scale · number + offset, ``unit``).
+
+    ``column`` is the name in the header (the variable in a MAT file), or the number of the column, from 1.
+    Of an extra channel the unit is kept: its factor is 1.
+    """
+
+    column: str | int
+    unit: str
+    factor: float
+    """From ``unit`` to SI; with ``shift``, which is not 0 for units such as degrees."""
+    shift: float = 0.0
+    sign: int = 1
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def si(self, numbers: Any) -> Any:
+        """Numbers of the file in SI."""
+        return self.factor * (self.sign * self.scale * numbers + self.offset) + self.shift
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """How a table becomes records; each of ``parts`` becomes one, named after its key; none: the headers say.
+
+    ``units`` are those of the channels that are not in `CHANNELS`. Either ``time`` is a column or ``dt`` is the
+    period in seconds. ``irregular`` says what to do with stamps that are not even: refuse them, resample
+    (interpolate on the even grid) or split into several records. ``header``: None looks for itself; ``delimiter``
+    and ``decimal`` too.
+    """
+
+    parts: Mapping[str, Mapping[str, Column]]
+    time: Column | None = None
+    dt: float | None = None
+    irregular: str = "error"
+    units: Mapping[str, str] = field(default_factory=dict)
+    header: bool | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    name: str = ""
+    notes: Sequence[str] = field(default_factory=tuple)
+
+
+def shipped_maps() -> dict[str, Path]:
+    """Column maps that come with the package, by name."""
+    folder = Path(str(resources.files("hydraulic_sysid.data"))) / "columns"
+    return {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+
+
+def load_column_map(source: str | Path) -> ColumnMap:
+    """The map in a YAML file, or the shipped one of that name.
+
+    :raises ColumnMapError: no such file or name, not YAML, or contents that mean nothing.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    path = Path(source)
+    if not path.is_file():
+        shipped = shipped_maps()
+        if str(source) not in shipped:
+            names = ", ".join(shipped)
+            raise ColumnMapError(f"{source}: no such column map; give a YAML file, or one of {names}")
+        path = shipped[str(source)]
+    try:
+        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise ColumnMapError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    return parse_column_map(document, str(path))
+
+
+def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
+    """The map in a document as YAML gives it; ``where`` names it in errors.
+
+    :raises ColumnMapError: contents that mean nothing; the text names the key and what is allowed.
+    """
+    keys = ("time", "channels", "extra", "records", "header", "delimiter", "decimal", "notes")
+    top = _mapping(document, where, keys)
+    if "channels" in top and "records" in top:
+        raise ColumnMapError(f"{where}: has both 'channels' and 'records' (several groups of channels); one is allowed")
+    groups = {"": top.get("channels", {})}
+    if "records" in top:
+        groups = dict(_mapping(top["records"], f"{where}: records"))
+        if not groups:
+            raise ColumnMapError(f"{where}: records is empty")
+    extra = _extra(top.get("extra", {}), f"{where}: extra")
+    parts = {
+        str(name): {**_channels(group, f"{where}: records.{name}" if name else f"{where}: channels"), **extra}
+        for name, group in groups.items()
+    }
+    if "channels" not in top and "records" not in top and not extra:
+        parts = {}
+    for name, part in parts.items():
+        if not part:
+            raise ColumnMapError(f"{where}: {f'records.{name}' if name else 'channels'} maps no channel")
+    time = _mapping(top.get("time", {}), f"{where}: time", ("column", "unit", "scale", "dt", "irregular"))
+    if ("dt" in time) == ("column" in time) and (parts or "dt" in time):
+        raise ColumnMapError(f"{where}: time needs either 'column' or 'dt' (the period in seconds)")
+    irregular = _choice(time.get("irregular", "error"), f"{where}: time.irregular", IRREGULAR)
+    dt, column = None, None
+    if "dt" in time:
+        dt = _number(time["dt"], f"{where}: time.dt")
+        if dt <= 0.0:
+            raise ColumnMapError(f"{where}: time.dt is {dt:g} s, must be positive")
+    elif "column" in time:
+        entry = {key: time[key] for key in ("column", "unit", "scale") if key in time}
+        column = _column(entry, "time", f"{where}: time")
+    notes = top.get("notes", [])
+    notes = [notes] if isinstance(notes, str) else notes
+    if not isinstance(notes, list) or not all(isinstance(note, str) for note in notes):
+        raise ColumnMapError(f"{where}: notes is {notes!r}, must be a text or a list of texts")
+    return ColumnMap(
+        parts,
+        column,
+        dt,
+        irregular,
+        {name: column.unit for name, column in extra.items()},
+        _choice(top.get("header"), f"{where}: header", (True, False, None)),
+        _choice(top.get("delimiter"), f"{where}: delimiter", (",", ";", "\t", " ", None)),
+        _choice(top.get("decimal"), f"{where}: decimal", (".", ",", None)),
+        where,
+        tuple(notes),
+    )
+
+
+def column_of_header(header: str) -> tuple[str, Column]:
+    """Quantity ("time" or a channel) and column of a header such as "position_mm" or "pressure_a_bar".
+
+    :raises ColumnMapError: no such channel, no unit, or a unit that does not fit.
+    """
+    text = header.strip()
+    where = f"column {text!r}"
+    # The longest name first: "pressure_a_bar" is not a channel "pressure" in the unit "a_bar".
+    for quantity in sorted(("time", *CHANNELS), key=len, reverse=True):
+        if text == quantity or text.startswith(f"{quantity}_"):
+            unit = text[len(quantity) + 1 :]
+            if not unit:
+                raise ColumnMapError(f"{where}: no unit; write {quantity}_{si_unit(quantity)}, for example")
+            return quantity, Column(text, unit, *to_si(unit, quantity, where))
+    raise ColumnMapError(
+        f"{where} is no channel; expected <channel>_<unit> with time, {allowed()}; "
+        "a column map can name or leave out any column"
+    )
+
+
+def _channels(document: Any, where: str) -> dict[str, Column]:
+    entries = _mapping(document, where)
+    for name in entries:
+        if name not in CHANNELS:
+            problem = f"{where}: {name!r} is no channel; allowed: {allowed()}; any other name under 'extra'"
+            raise ColumnMapError(problem)
+    # "pressure_b: null" says in so many words that a channel was not measured.
+    return {n: _column(entry, n, f"{where}.{n}") for n, entry in entries.items() if entry is not None}
+
+
+def _extra(document: Any, where: str) -> dict[str, Column]:
+    entries = _mapping(document, where)
+    for name in entries:
+        if name in (TIME, *CHANNELS) or not isinstance(name, str) or not name.isidentifier():
+            allowed_names = "a name in letters, digits and _ that is no channel's"
+            raise ColumnMapError(f"{where}: {name!r}; allowed: {allowed_names}")
+    return {name: _column(entry, None, f"{where}.{name}") for name, entry in entries.items()}
+
+
+def _column(document: Any, quantity: str | None, where: str) -> Column:
+    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset"))
+    if "column" not in entry:
+        raise ColumnMapError(f"{where}: 'column' is missing (a name in the header, or a number from 1)")
+    column = entry["column"]
+    if isinstance(column, bool) or not isinstance(column, (str, int)) or (isinstance(column, int) and column < 1):
+        raise ColumnMapError(f"{where}: column is {column!r}, must be a name in the header or a number from 1")
+    sign = _choice(entry.get("sign", 1), f"{where}.sign", (1, -1))
+    scale = _number(entry.get("scale", 1.0), f"{where}.scale")
+    if scale == 0.0:
+        raise ColumnMapError(f"{where}.scale is 0, must not be")
+    if not isinstance(entry.get("unit"), str) or not entry["unit"].strip():
+        wanted = f"it must convert to {si_unit(quantity)}" if quantity else "it is kept as it is; '1' is allowed"
+        raise ColumnMapError(f"{where}: 'unit' is {entry.get('unit')!r}, a text is needed; {wanted}")
+    unit = entry["unit"]
+    offset = _number(entry.get("offset", 0.0), f"{where}.offset")
+    factors = (1.0, 0.0) if quantity is None else to_si(unit, quantity, where)
+    return Column(column, unit, *factors, sign, scale, offset)
+
+
+def _mapping(document: Any, where: str, keys: Sequence[str] | None = None) -> Mapping[str, Any]:
+    if not isinstance(document, Mapping):
+        raise ColumnMapError(f"{where}: is {document!r}, must be a mapping of keys")
+    for key in document:
+        if keys is not None and key not in keys:
+            raise ColumnMapError(f"{where}: unknown key {key!r}; allowed: {', '.join(keys)}")
+    return document
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ColumnMapError(f"{where} is {value!r}, must be a finite number")
+    return float(value)
+
+
+def _choice(value: Any, where: str, choices: Sequence[Any]) -> Any:
+    if not any(value == choice and type(value) is type(choice) for choice in choices):
+        names = ", ".join(repr(choice) for choice in choices)
+        raise ColumnMapError(f"{where} is {value!r}; allowed: {names}")
+    return value

@@ -1,0 +1,228 @@
+"""Tables in text files: CSV and the like, plain or gzip-compressed, with or without a header."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import zlib
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sysid.data.errors import ColumnMapError, FileError
+from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header
+from hydraulic_sysid.data.records.record import Record
+from hydraulic_sysid.data.records.table import records_of_table
+
+Array = NDArray[np.float64]
+
+SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz")
+_GZIP_MAGIC = b"\x1f\x8b"
+
+
+def read_csv(path: Path, columns: ColumnMap | None, name: str) -> list[Record]:
+    """Records in a text file; without a map its header must name channels as ``<channel>_<unit>``.
+
+    :raises FileError: unreadable, empty, ragged, or a cell that is no number; names row and column.
+    :raises ColumnMapError: a header that names no channel, or has a wrong unit.
+    """
+    table = CsvTable(path, columns)
+    if columns is None or not columns.parts:
+        columns = table.map_of_header(columns)
+    return records_of_table(table, columns, name)
+
+
+class CsvTable:
+    """A table in a text file; cells become numbers when their column is asked for.
+
+    Separator (; tab , or blanks), decimal comma and header are looked for where the map does not fix them. Rows
+    are counted from 1, with the header and empty lines, as an editor shows them.
+    """
+
+    def __init__(self, path: Path, columns: ColumnMap | None = None) -> None:
+        self.path = path
+        lines = _text(path).splitlines()
+        rows = [number for number, line in enumerate(lines, 1) if line and not line.isspace()]
+        if len(rows) != len(lines):
+            lines = [lines[number - 1] for number in rows]
+        # A comment of '#' lines may stand before the table.
+        comments = next((k for k, line in enumerate(lines) if not line.lstrip().startswith("#")), len(lines))
+        del lines[:comments], rows[:comments]
+        if not lines:
+            raise FileError(path, "the file is empty", expected="a header and rows of numbers")
+        self._delimiter = (columns and columns.delimiter) or _delimiter(lines[min(1, len(lines) - 1)])
+        self.names: Sequence[str] = ()
+        self._header_row = 0
+        cells = self._cells(lines[0])
+        if _has_header(path, rows[0], cells, columns.header if columns else None):
+            self.names = [cell.strip() for cell in cells]
+            self._header_row = rows[0]
+            del lines[0], rows[0]
+            twice = [name for index, name in enumerate(self.names) if name in self.names[:index]]
+            if twice:
+                raise FileError(path, f"two columns are called {twice[0]!r}", row=self._header_row)
+        if len(lines) < 2:
+            raise FileError(path, f"{len(lines)} rows of numbers", expected="at least two")
+        self._rows, self._lines = rows, lines
+        self._width = len(cells)
+        self._check_ragged()
+        decimal = columns.decimal if columns else None
+        if decimal is None:
+            commas = self._delimiter != "," and any("," in line for line in lines)
+            decimal = "," if commas and not any("." in line for line in lines) else "."
+        if decimal == "," and self._delimiter == ",":
+            raise ColumnMapError(f"{path}: decimal and delimiter cannot both be ','")
+        self._comma = decimal == ","
+        self._numbers: Array | None = None
+
+    def map_of_header(self, base: ColumnMap | None = None) -> ColumnMap:
+        """The map that the header states; ``base`` says the rest, and perhaps the time.
+
+        :raises ColumnMapError: no header, no time, or a name that is no channel with a unit.
+        """
+        if not self.names:
+            raise ColumnMapError(
+                f"{self.path}: no header such as time_s, drive_V, position_m; say by a column map what the "
+                f"{self._width} columns are"
+            )
+        try:
+            found = dict(column_of_header(name) for name in self.names)
+        except ColumnMapError as error:
+            raise ColumnMapError(f"{self.path}, row {self._header_row}: {error}") from None
+        if len(found) != len(self.names):
+            raise ColumnMapError(f"{self.path}, row {self._header_row}: two columns are the same channel: {self.names}")
+        time = found.pop("time", None)
+        base = base or ColumnMap({})
+        if base.time is not None or base.dt is not None:
+            time = base.time
+        elif time is None:
+            raise ColumnMapError(f"{self.path}, row {self._header_row}: no time column; expected one such as time_s")
+        if not found:
+            raise ColumnMapError(f"{self.path}, row {self._header_row}: only a time; expected channels beside it")
+        return replace(base, parts={"": found}, time=time)
+
+    def numbers(self, column: str | int) -> Array:
+        """``(N,)`` numbers of a column."""
+        index = self._index(column)
+        if self._numbers is None:
+            try:
+                self._numbers = self._parse(None)
+            except ValueError:
+                self._numbers = np.empty((0, 0))  # some column is no number: it may be one that nobody wants
+        if self._numbers.size:
+            return self._numbers[:, index]
+        try:
+            return self._parse([index])[:, 0]
+        except ValueError as error:
+            raise self._complaint(index, error) from None
+
+    def row(self, index: int) -> int:
+        """Line of a sample in the file, from 1."""
+        return self._rows[index]
+
+    def label(self, column: str | int) -> str | int:
+        """Name in the header where there is one, else the number counted from 1."""
+        index = self._index(column)
+        return self.names[index] if self.names else index + 1
+
+    def _cells(self, line: str) -> list[str]:
+        if self._delimiter == " ":
+            return line.split()
+        try:
+            return next(csv.reader([line], delimiter=self._delimiter))
+        except csv.Error as error:
+            raise FileError(self.path, f"not a row of cells ({error}): {line[:40]!r}") from None
+
+    def _check_ragged(self) -> None:
+        if self._delimiter == " ":
+            widths = [len(line.split()) for line in self._lines]
+        else:
+            widths = [line.count(self._delimiter) + 1 for line in self._lines]
+        for index, width in enumerate(widths):
+            if width != self._width and len(self._cells(self._lines[index])) != self._width:
+                cells = len(self._cells(self._lines[index]))
+                raise FileError(self.path, f"{cells} cells", row=self._rows[index], expected=f"{self._width} cells")
+
+    def _index(self, column: str | int) -> int:
+        if isinstance(column, str):
+            if column not in self.names:
+                there = ", ".join(self.names) if self.names else "no header"
+                raise FileError(self.path, f"no column {column!r}; there is {there}")
+            return list(self.names).index(column)
+        if column > self._width:
+            raise FileError(self.path, f"no column {column}; there are 1 … {self._width}")
+        return column - 1
+
+    def _parse(self, wanted: Sequence[int] | None) -> Array:
+        lines = [line.replace(",", ".") for line in self._lines] if self._comma else self._lines
+        numbers = np.loadtxt(
+            lines,
+            delimiter=None if self._delimiter == " " else self._delimiter,
+            usecols=wanted,
+            comments=None,
+            quotechar='"',
+            ndmin=2,
+        )
+        if numbers.shape[0] != len(lines):  # a quote that is not closed takes the next row in
+            raise ValueError("a quotation mark is not closed")
+        return numbers
+
+    def _complaint(self, index: int, error: ValueError) -> FileError:
+        for row, line in zip(self._rows, self._lines, strict=True):
+            cell = self._cells(line)[index].strip()
+            if not _is_number(cell, self._comma):
+                problem = f"{cell!r} is no number" if cell else "the cell is empty"
+                label = self.names[index] if self.names else index + 1
+                return FileError(self.path, problem, row=row, column=label, expected="a number")
+        return FileError(self.path, str(error))
+
+
+def _text(path: Path) -> str:
+    data = path.read_bytes()
+    if data.startswith(_GZIP_MAGIC):
+        try:
+            data = gzip.decompress(data)
+        except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+            raise FileError(path, f"the gzip file is cut off or damaged ({error})") from None
+    elif path.suffix == ".gz" and data:
+        raise FileError(path, "is called .gz but is no gzip file")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = data.count(b"\n", 0, error.start) + 1
+        raise FileError(path, f"not text in UTF-8 (byte {error.start})", row=row) from None
+
+
+def _delimiter(line: str) -> str:
+    """The separator of a row of numbers; a comma is one only where nothing else is."""
+    return next((mark for mark in (";", "\t", ",") if mark in line), " ")
+
+
+def _has_header(path: Path, row: int, cells: Sequence[str], wanted: bool | None) -> bool:
+    if wanted is not None:
+        return wanted
+    numeric = [_is_number(cell) for cell in cells]
+    if any(numeric) and not all(numeric):
+        odd = numeric.index(False)
+        raise FileError(
+            path,
+            f"{cells[odd].strip()!r} stands among numbers",
+            row=row,
+            column=odd + 1,
+            expected="a header of names only, or numbers only",
+        )
+    return not any(numeric)
+
+
+def _is_number(cell: str, comma: bool = True) -> bool:
+    """Whether a cell is a number as `numpy.loadtxt` reads it, with a comma for the point if that is allowed."""
+    if not cell.isascii() or "_" in cell:  # Python itself reads 1_000 and digits of other scripts
+        return False
+    try:
+        float(cell.replace(",", ".") if comma else cell)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,76 @@
+"""Reading records from whatever holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from hydraulic_sysid.data.errors import FileError, RecordError
+from hydraulic_sysid.data.records import csv_file, mat_file
+from hydraulic_sysid.data.records.column_map import ColumnMap, load_column_map
+from hydraulic_sysid.data.records.record import Record
+
+_BAG_SUFFIX = ".mcap"
+_SUFFIXES = (*csv_file.SUFFIXES, *mat_file.SUFFIXES, _BAG_SUFFIX)
+
+
+def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None) -> list[Record]:
+    """Records in a bag folder, a .csv, .csv.gz or .mat file, or a folder of such, in the order of their names.
+
+    ``columns`` is a column map, a YAML file with one, or the name of a shipped one; without it, headers must
+    say channel and unit (``position_mm``). Bags need none.
+
+    :raises FileError: nothing there, unknown kind, or unreadable; names file, row and column.
+    :raises RecordError: see `RecordError` for its kinds.
+    """
+    path = Path(path)
+    mapping = columns if isinstance(columns, ColumnMap) or columns is None else load_column_map(columns)
+    if not path.exists():
+        raise FileError(path, "does not exist")
+    if path.is_dir() and not _is_bag(path):
+        entries = [entry for entry in sorted(path.iterdir()) if _holds_record(entry)]
+        if not entries:
+            raise FileError(path, "holds no records", expected=_kinds())
+        return [record for entry in entries for record in _read(entry, mapping)]
+    if not _holds_record(path):
+        raise FileError(path, "is of no known kind", expected=_kinds())
+    return _read(path, mapping)
+
+
+def read_all(paths: Iterable[Path | str], columns: ColumnMap | Path | str | None = None) -> list[Record]:
+    """Records of several paths, in this order.
+
+    :raises RecordError: as `read_records`, and for no path at all.
+    """
+    mapping = columns if isinstance(columns, ColumnMap) or columns is None else load_column_map(columns)
+    records = [record for path in paths for record in read_records(path, mapping)]
+    if not records:
+        raise RecordError("no record is named")
+    return records
+
+
+def _is_bag(folder: Path) -> bool:
+    """Whether a folder is a bag, complete or left behind by a recorder."""
+    return (folder / "metadata.yaml").is_file() or any(folder.glob(f"*{_BAG_SUFFIX}"))
+
+
+def _holds_record(path: Path) -> bool:
+    return _is_bag(path) if path.is_dir() else path.name.lower().endswith(_SUFFIXES)
+
+
+def _read(path: Path, columns: ColumnMap | None) -> list[Record]:
+    suffix = next((s for s in sorted(_SUFFIXES, key=len, reverse=True) if path.name.lower().endswith(s)), "")
+    if path.is_dir() or suffix == _BAG_SUFFIX:
+        # Here and not above: what reads bags takes long to load, most records are tables, and it needs the errors
+        # of this package itself.
+        from hydraulic_sysid.data.records.bag_record import read_bag
+
+        return read_bag(path, columns.irregular if columns else "error")
+    stem = path.name[: -len(suffix)]
+    if suffix in mat_file.SUFFIXES:
+        return mat_file.read_mat(path, columns, stem)
+    return csv_file.read_csv(path, columns, stem)
+
+
+def _kinds() -> str:
+    return f"a bag folder, or a file {', '.join(_SUFFIXES)}"

@@ -1,0 +1,183 @@
+"""From the columns of a file to records: units, even time, absent channels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sysid.data.errors import FileError, TimeError
+from hydraulic_sysid.data.records import sampling
+from hydraulic_sysid.data.records.channels import HELD
+from hydraulic_sysid.data.records.column_map import Column, ColumnMap
+from hydraulic_sysid.data.records.record import Record
+
+Array = NDArray[np.float64]
+
+_WORTH_A_NOTE = 0.05  # of a period that stamps are off the even grid
+_MOST_SAMPLES = 20_000_000  # of a resampled record
+
+
+class Table(Protocol):
+    """Named or numbered columns of numbers, read from one file."""
+
+    path: Path
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of all columns; empty where they have none."""
+
+    def numbers(self, column: str | int) -> Array:
+        """``(N,)`` of a column; raises FileError if there is none or it holds something else."""
+
+    def row(self, index: int) -> int:
+        """Where sample ``index`` is in the file, as a user counts."""
+
+    def label(self, column: str | int) -> str | int:
+        """How to name a column to the user."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Channels with their stamps, before it is known that these are even.
+
+    ``row`` tells where a sample is in the file; ``column`` names the time there.
+    """
+
+    path: Path
+    time: Array
+    channels: Mapping[str, Array]
+    row: Callable[[int], int]
+    column: str | int
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def records_of_table(table: Table, columns: ColumnMap, name: str) -> list[Record]:
+    """One record per part of the map (more where it says to split at gaps).
+
+    :raises FileError: a column is missing or holds a value that is not finite; names row and column.
+    :raises TimeError: the time is not even, and the map does not say what to do then.
+    """
+    records = []
+    for part, mapped in columns.parts.items():
+        notes = list(columns.notes)
+        channels = {channel: _finite(table, column) for channel, column in mapped.items()}
+        title = f"{name}.{part}" if part else name
+        description: dict[str, Any] = {"columns": columns.name} if columns.name else {}
+        drive_from_command(channels, notes)
+        sizes = {values.size for values in channels.values()}
+        if columns.dt is not None:
+            if len(sizes) != 1 or min(sizes) < 2:
+                raise FileError(table.path, f"columns have {sorted(sizes)} samples", expected="equal lengths ≥ 2")
+            description["notes"] = notes
+            records.append(Record.sampled(title, columns.dt, channels, table.path, description, columns.units))
+            continue
+        assert columns.time is not None
+        time = _finite(table, columns.time)
+        if sizes != {time.size} or time.size < 2:
+            problem = f"channels have {sorted(sizes)} samples, the time {time.size}"
+            raise FileError(table.path, problem, expected="equal lengths, at least 2")
+        samples = Samples(table.path, time, channels, table.row, table.label(columns.time.column), columns.units)
+        records += evenly_sampled(samples, columns.irregular, title, notes, description)
+    return records
+
+
+def evenly_sampled(
+    samples: Samples, irregular: str, name: str, notes: list[str], description: Mapping[str, Any]
+) -> list[Record]:
+    """The samples as one record, or as several where ``irregular`` is "split" and samples are missing.
+
+    :raises TimeError: the stamps do not increase, or are not even and ``irregular`` is "error".
+    """
+    time = samples.time
+    try:
+        sampling.increasing(time)
+        if irregular == "resample":
+            return [_resampled(samples, name, notes, description)]
+        pieces = [(0, time.size)]
+        if irregular == "split":
+            bounds = [0, *sampling.gaps(time), time.size]
+            pieces = [(a, b) for a, b in zip(bounds, bounds[1:], strict=False) if b - a > 1]
+        return list(_pieces(samples, pieces, name, notes, description))
+    except sampling.IrregularTimeError as error:
+        row = samples.row(error.index)
+        hint = "; a column map can say time.irregular: resample or split" if irregular == "error" else ""
+        raise TimeError(
+            samples.path, error.problem, row=row, column=samples.column, expected=error.expected + hint
+        ) from None
+
+
+def drive_from_command(channels: dict[str, Array], notes: list[str]) -> None:
+    """Where only the command was recorded, take it for the applied drive, and say so."""
+    if "drive" not in channels and "command" in channels:
+        channels["drive"] = channels["command"]
+        notes.append("drive: not recorded; the command is taken for it")
+
+
+def _pieces(
+    samples: Samples,
+    pieces: Sequence[tuple[int, int]],
+    name: str,
+    notes: Sequence[str],
+    description: Mapping[str, Any],
+) -> Iterator[Record]:
+    for number, (first, last) in enumerate(pieces, 1):
+        time = samples.time[first:last]
+        try:
+            even = sampling.sampling(time)
+        except sampling.IrregularTimeError as error:
+            raise sampling.IrregularTimeError(error.index + first, error.problem, error.expected) from None
+        described = {
+            **description,
+            "notes": list(notes),
+            "start_s": float(time[0]),
+            "stamp_deviation_s": {"p99": even.deviation_p99, "max": even.deviation_max},
+        }
+        if even.deviation_p99 > _WORTH_A_NOTE * even.dt:
+            off = f"99 % up to {even.deviation_p99:.3g} s, at most {even.deviation_max:.3g} s"
+            described["notes"] = [*notes, f"time: stamps are off the even grid of {even.dt:.6g} s: {off}"]
+        if len(pieces) > 1:
+            described["piece"] = [number, len(pieces)]
+        channels = {channel: values[first:last] for channel, values in samples.channels.items()}
+        title = f"{name}.{number}" if len(pieces) > 1 else name
+        yield Record.sampled(title, even.dt, channels, samples.path, described, samples.units)
+
+
+def _resampled(samples: Samples, name: str, notes: Sequence[str], description: Mapping[str, Any]) -> Record:
+    """On the even grid with the median period; drives hold their value, the rest is interpolated linearly."""
+    time = samples.time
+    dt = float(f"{np.median(np.diff(time)):.9g}")
+    span = float(time[-1] - time[0])
+    if span > _MOST_SAMPLES * dt:
+        problem = f"resampling {span:.6g} s every {dt:.6g} s makes more than {_MOST_SAMPLES} samples"
+        raise sampling.IrregularTimeError(int(np.argmax(np.diff(time))) + 1, problem, "shorter gaps")
+    count = int(span / dt + 1e-6) + 1
+    grid = time[0] + dt * np.arange(count)
+    before = np.clip(np.searchsorted(time, grid + 1e-6 * dt, side="right") - 1, 0, time.size - 1)
+    channels = {
+        channel: values[before] if channel in HELD else np.interp(grid, time, values)
+        for channel, values in samples.channels.items()
+    }
+    longest = float(np.diff(time).max())
+    note = f"resampled from {time.size} irregular samples (longest step {longest:.6g} s) to dt = {dt:.9g} s"
+    described = {**description, "notes": [*notes, note], "start_s": float(time[0])}
+    return Record.sampled(name, dt, channels, samples.path, described, samples.units)
+
+
+def _finite(table: Table, column: Column) -> Array:
+    numbers = table.numbers(column.column)
+    if not np.isfinite(numbers).all():
+        index = int(np.flatnonzero(~np.isfinite(numbers))[0])
+        raise FileError(
+            table.path,
+            f"value is {numbers[index]}",
+            row=table.row(index),
+            column=table.label(column.column),
+            expected="a finite number",
+        )
+    values: Array = np.asarray(column.si(numbers), dtype=np.float64)
+    return values

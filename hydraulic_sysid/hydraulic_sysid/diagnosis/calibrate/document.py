@@ -1,0 +1,185 @@
+"""A calibration from beginning to end, and every figure of it in one document (see docs/report-json.md)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import date
+from typing import Any
+
+import numpy as np
+
+from hydraulic_sim.model import Model
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.results import heading
+from hydraulic_sysid.estimation.estimate import CalibrationError, Fit, Settings, evaluate, fit, loss
+from hydraulic_sysid.estimation.uncertainty import BLIND, at_bounds, uncertainty
+
+_WIDTH = 1.96  # standard errors on either side of a 95 % interval
+EXACT = 1.1  # residual over noise up to which a model is said to explain its records
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The calibrated model (with standard errors and history) and the result document."""
+
+    model: Model
+    result: dict[str, Any]
+
+
+def calibrate(
+    model: Model,
+    records: Sequence[Record],
+    held_out: Sequence[Record] = (),
+    settings: Settings | None = None,
+    keys: Sequence[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Calibration:
+    """Fit ``keys`` (default: the model's free parameters) to ``records``; try the result on ``held_out``.
+
+    Held-out records are never seen by the fit. Raises `CalibrationError`, `hydraulic_sim.errors.ModelError` for an
+    unknown key, and `hydraulic_sim.errors.SimulationError`.
+    """
+    settings = settings or Settings()
+    chosen = list(dict.fromkeys(model.free_keys() if keys is None else keys))
+    in_use = model.keys()
+    unknown = [k for k in chosen if k not in in_use]
+    if unknown:
+        raise CalibrationError(f"{', '.join(unknown)}: not in the model; it has: {', '.join(in_use)}")
+    if not chosen:
+        raise CalibrationError("nothing to fit: no parameter is free (mark one `fit: free` in the model file)")
+    same = [h.name for h in held_out if any(_shares_samples(h, r) for r in records)]
+    if same:
+        raise CalibrationError(f"held-out records are also among those to fit: {', '.join(same)}")
+    say = progress or (lambda _: None)
+    say("residuals before")
+    before = evaluate(model, records, settings)
+    held_before = evaluate(model, held_out, settings) if held_out else None
+    done = fit(model, records, chosen, settings, lambda i, rms: say(f"step {i}: residual {rms:.3g} times the noise"))
+    bounds = {k: model.entry(k).bounds for k in chosen}
+    known = uncertainty(done)
+    stuck = at_bounds(done, bounds)  # type: ignore[arg-type]
+    calibrated = model.with_values(done.values, source="calibrated")
+    for key, error in known.standard_errors.items():
+        calibrated = calibrated.with_entry(key, standard_error=error if math.isfinite(error) else None)
+    calibrated = calibrated.with_history(
+        date=date.today().isoformat(),
+        change="calibrated " + ", ".join(chosen),
+        records=[r.name for r in records],
+        held_out=[r.name for r in held_out],
+        error_before=float(f"{before.rms:.4g}"),
+        error_after=float(f"{done.rms:.4g}"),
+        error_unit="residual over noise",
+    )
+    held_after = evaluate(calibrated, held_out, settings) if held_out else None
+    result = {
+        **heading("calibrate"),
+        "model": {"name": model.name, "path": None if model.path is None else str(model.path)},
+        "settings": {"piece": settings.length, "robust": settings.robust},
+        "records": [_about(r, True) for r in records] + [_about(r, False) for r in held_out],
+        "converged": done.converged,
+        "steps": done.steps,
+        "fitted": _residuals(before, done),
+        "held_out": None if held_before is None or held_after is None else _residuals(held_before, held_after),
+        "parameters": [
+            {
+                "key": key,
+                "unit": model.parameter(key).unit,
+                "before": model.value(key),
+                "value": float(done.values[key]),
+                "standard_error": known.standard_errors[key],
+                "interval": _interval(done.values[key], known.standard_errors[key]),
+                "scale": done.scales[key],
+                "bounds": list(bounds[key]),  # type: ignore[arg-type]
+                "at_bound": stuck.get(key),
+                "told": known.standard_errors[key] < BLIND * done.scales[key],
+            }
+            for key in chosen
+        ],
+        "correlation": {"keys": chosen, "matrix": known.correlation.tolist()},
+        "condition": known.condition,
+        "not_told": [{"weights": d.weights, "error": d.error} for d in known.blind],
+    }
+    result["verdict"] = _verdict(result)
+    return Calibration(calibrated, result)
+
+
+def _about(record: Record, fitted: bool) -> dict[str, Any]:
+    return {
+        "name": record.name,
+        "source": str(record.source),
+        "samples": len(record),
+        "sampling_time": record.dt,
+        "duration": record.duration,
+        "fitted": fitted,
+    }
+
+
+def _shares_samples(one: Record, other: Record) -> bool:
+    """Whether two records, or windows of them, are in part the same experiment."""
+    if (one.source, _whole(one)) != (other.source, _whole(other)):
+        return False
+    (a, b), (c, d) = _span(one), _span(other)
+    return a < d - 1e-9 and c < b - 1e-9
+
+
+def _whole(record: Record) -> str:
+    return record.name.partition("[")[0]
+
+
+def _span(record: Record) -> tuple[float, float]:
+    begin, end = record.description.get("window_s", (0.0, record.duration))
+    return float(begin), float(end)
+
+
+def _interval(value: float, error: float) -> list[float]:
+    """The 95 % interval, infinite where the data do not tell the parameter."""
+    return [float(value - _WIDTH * error), float(value + _WIDTH * error)]
+
+
+def _residuals(before: Fit, after: Fit) -> dict[str, Any]:
+    """Residual over noise, before and after: over all, and per record and channel with the noise floor beside it."""
+    rows = []
+    for old, new, pieces in zip(_by_channel(before), _by_channel(after), after.shooting.pieces, strict=True):
+        for c, channel in enumerate(pieces.channels):
+            rows.append(
+                {
+                    "record": pieces.record.name,
+                    "channel": channel,
+                    "noise": float(pieces.noise[c]),
+                    "before": float(old[c]),
+                    "after": float(new[c]),
+                }
+            )
+    return {"before": before.rms, "after": after.rms, "records": rows}
+
+
+def _by_channel(fitted: Fit) -> list[np.ndarray]:
+    """Residual over noise per channel (C,), one array per record, the starts' degrees of freedom taken out."""
+    found = []
+    for pieces, residual in zip(fitted.shooting.pieces, fitted.residuals, strict=True):
+        free = len(pieces.free)
+        counted = loss(residual[:, :-free], fitted.settings)
+        squares = counted.reshape(len(pieces.starts), pieces.samples, len(pieces.channels))
+        used = len(pieces.starts) * free / squares.size
+        found.append(np.sqrt(squares.mean(axis=(0, 1)) / (1.0 - used)))
+    return found
+
+
+def _verdict(result: dict[str, Any]) -> dict[str, str]:
+    """One sentence: how far the error fell, where it stands, and what the data do not tell."""
+    judged = result["held_out"] or result["fitted"]
+    where = "held-out records" if result["held_out"] else "the records fitted (none were held out)"
+    level = "explained" if judged["after"] <= EXACT else "off"
+    text = f"On {where} the residual went from {judged['before']:.3g} to {judged['after']:.3g} times the noise" + (
+        "; nothing is left to explain."
+        if level == "explained"
+        else "; something is left that no free parameter explains."
+    )
+    vague = [p["key"] for p in result["parameters"] if not p["told"]]
+    if vague:
+        text += f" These data do not tell {', '.join(vague)}."
+    if not result["converged"]:
+        text += " The fit has not converged."
+    return {"level": level, "text": text}

@@ -1,0 +1,78 @@
+"""The measured channels of a record as the comparison uses them.
+
+The velocity is the derivative of the measured position by a Savitzky–Golay filter (cubic, zero phase, its length
+chosen by the record's own noise and motion): the sensor does not measure it. The simulated position passes
+the same filter, so that the filter's bandwidth is in both and not in their difference. The load pressure is
+the force of the pressures over the area of side A, p_A − p_B·A_b/A_a.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sim.model_file import Model
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.estimation.noise import noise_floor
+from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
+
+Array = NDArray[np.float64]
+
+UNITS = {
+    "position": "m",
+    "velocity": "m/s",
+    "pressure_a": "Pa",
+    "pressure_b": "Pa",
+    "load_pressure": "Pa",
+    "pressure_supply": "Pa",
+    "spool": "1",
+    "drive": "V",
+}
+"""Channels in the order of tables and plots, with their SI unit."""
+
+COMPARED = ("position", "velocity", "pressure_a", "pressure_b", "load_pressure", "pressure_supply", "spool")
+_NUMERICAL = 1e-6  # of the largest value: what a record without noise is not held to
+
+
+def load_pressure(pressure_a: Array, pressure_b: Array, model: Model) -> Array:
+    """p_A − p_B·A_b/A_a: the pressures' force over the area of side A."""
+    return pressure_a - pressure_b * (model.value("piston_area_b") / model.value("piston_area_a"))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A record's channels, those that follow from them, and their noise floors."""
+
+    record: Record
+    channels: dict[str, Array]
+    noise: dict[str, float]
+    velocity_filter: VelocityFilter
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """Channels that can be set against the model."""
+        return tuple(name for name in COMPARED if name in self.channels)
+
+
+def measured(record: Record, model: Model, to_velocity: VelocityFilter | None = None) -> Measured:
+    """Channels, derived channels and noise floors of a record that has at least ``drive`` and ``position``.
+
+    ``to_velocity`` fixes the derivative filter; otherwise the record's own noise and motion choose it.
+    """
+    channels = {name: record[name] for name in UNITS if name in record and name != "velocity"}
+    if "spool" in channels:
+        channels["spool"] = channels["spool"] / model.value("spool_travel")
+    noise = {name: _noise(values) for name, values in channels.items()}
+    to_velocity = to_velocity or VelocityFilter.for_signal(channels["position"], record.dt, noise["position"])
+    channels["velocity"] = to_velocity(record["position"])
+    noise["velocity"] = noise["position"] * to_velocity.noise_gain
+    if "pressure_a" in channels and "pressure_b" in channels:
+        channels["load_pressure"] = load_pressure(channels["pressure_a"], channels["pressure_b"], model)
+        noise["load_pressure"] = _noise(channels["load_pressure"])
+    return Measured(record, channels, noise, to_velocity)
+
+
+def _noise(values: Array) -> float:
+    return max(noise_floor(values), _NUMERICAL * float(np.abs(values).max()))

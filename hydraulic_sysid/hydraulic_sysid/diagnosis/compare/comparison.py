@@ -1,0 +1,227 @@
+"""Compares a model with records and gathers every figure in one document (see docs/report-json.md)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sim.model_file import Model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.display import TITLES, number, percent
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.results import heading
+from hydraulic_sysid.estimation import noise
+
+from . import errormaps, findings
+from .channels import UNITS
+from .document import model_document, record_document
+from .errormaps import ErrorMap
+from .findings import Finding
+from .prediction import TILES, ComparisonError, check
+from .run import MODES, Compared, run
+from .spectra import SEGMENT_SECONDS
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+VARIABLES = {"velocity": "m/s", "drive": "V", "spool": "1", "load_pressure": "Pa", "position": "m", "time": "s"}
+_STANDING = 3.0  # standard deviations of the velocity's noise below which a piston counts as standing
+HEADLINE = ("position", "load_pressure")
+"""Channels whose fit stands in the verdict."""
+_HEADLINE_SHARE = 0.25
+_CLOSE = 0.1  # relative error up to which a model that is not exact is called close
+_SECOND = 0.8  # a second variable is named if it explains at least this part of what the first explains
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a user may choose about a comparison."""
+
+    horizon: float = 0.5
+    """Seconds ahead of the finite-horizon prediction."""
+    trace_points: int = 1400
+    """Points kept of each trace for the plots."""
+
+
+def compare(
+    model: Model, records: Sequence[Record], settings: Settings | None = None, progress: Progress | None = None
+) -> dict[str, Any]:
+    """Result document of a model set against records; arrays are NumPy, SI.
+
+    ``progress`` is called with the name of each record as its turn comes.
+
+    :raises ComparisonError: no record, or one that lacks what a comparison needs.
+    :raises hydraulic_sim.errors.SimulationError: when the model cannot be run over a record.
+    """
+    settings = settings or Settings()
+    if not records:
+        raise ComparisonError("there is no record to compare with")
+    for record in records:
+        check(record, settings.horizon)
+    plant = Plant(model)
+    compared = _run_all(model, plant, records, settings, progress)
+    channels = [name for name in UNITS if any(name in c.data.compared for c in compared)]
+    maps = error_maps(compared, channels)
+    documents = [
+        {**record_document(c, settings.trace_points), "error_maps": _plain_maps(error_maps([c], c.data.compared))}
+        for c in compared
+    ]
+    summary = {name: _pooled(documents, name) for name in channels}
+    found = _findings(documents, summary, maps, settings)
+    return {
+        **heading("compare"),
+        "model": model_document(model),
+        "settings": {
+            "horizon": settings.horizon,
+            "horizon_part": 1.0 / TILES,
+            "velocity_filter": "Savitzky–Golay derivative of the position, cubic, zero phase; length per record",
+            "noise_method": noise.METHOD,
+            "spectrum_segment": SEGMENT_SECONDS,
+        },
+        "channels": {name: {"unit": UNITS[name], "title": TITLES[name]} for name in channels},
+        "variables": {
+            name: {"unit": unit, "title": TITLES[name]}
+            for name, unit in {**VARIABLES, "direction": "1"}.items()
+            if any(name in by for by in maps.values())
+        },
+        "verdict": _verdict(summary, found, settings),
+        "findings": [f.as_dict() for f in found],
+        "summary": summary,
+        "error_maps": _plain_maps(maps),
+        "records": documents,
+    }
+
+
+def _run_all(
+    model: Model, plant: Plant, records: Sequence[Record], settings: Settings, progress: Progress | None
+) -> list[Compared]:
+    """All records in their order; the plant's kernels run beside each other on as many cores as there are."""
+
+    def one(index: int) -> Compared:
+        if progress is not None:
+            progress(records[index].name)
+        return run(model, plant, records[index], settings.horizon, seed=index)
+
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        return list(pool.map(one, range(len(records))))
+
+
+def error_maps(compared: Sequence[Compared], channels: Sequence[str]) -> dict[str, dict[str, ErrorMap]]:
+    """Maps of every channel's horizon error over every variable that all records have, records pooled."""
+    folds = errormaps.folds_of([c.data.record.time for c in compared])
+    values: dict[str, Array] = {}
+    for name in VARIABLES:
+        if name == "time":
+            values[name] = np.concatenate([c.data.record.time - c.data.record.time[0] for c in compared])
+        elif all(name in c.data.channels for c in compared):
+            values[name] = np.concatenate([c.data.channels[name] for c in compared])
+    edges: dict[str, Array | None] = {name: None for name in values}
+    categories = [
+        errormaps.directions(c.data.channels["velocity"], _STANDING * c.data.noise["velocity"]) for c in compared
+    ]
+    values["direction"], edges["direction"] = np.concatenate([k for k, _ in categories]), categories[0][1]
+    binnings = {name: errormaps.Binning.of(x, edges[name]) for name, x in values.items()}
+    maps: dict[str, dict[str, ErrorMap]] = {}
+    for channel in channels:
+        error = np.concatenate(
+            [
+                c.error("horizon", channel) if channel in c.data.compared else np.full(c.data.record.time.size, np.nan)
+                for c in compared
+            ]
+        )
+        independent = errormaps.independent_samples(error, folds)
+        maps[channel] = {v: errormaps.error_map(error, b, folds, independent) for v, b in binnings.items()}
+    return maps
+
+
+def _plain_maps(maps: dict[str, dict[str, ErrorMap]]) -> dict[str, Any]:
+    return {name: {v: m.as_dict() for v, m in by.items()} for name, by in maps.items()}
+
+
+def _pooled(documents: Sequence[dict[str, Any]], channel: str) -> dict[str, Any]:
+    """Figures over all samples of all records, per mode, and the record with the largest error."""
+    parts = [(d["name"], d["channels"][channel]) for d in documents if channel in d["channels"]]
+    samples = np.array([p["horizon"]["samples"] for _, p in parts], dtype=float)
+
+    def pool(values: list[float]) -> float:
+        return float(np.sqrt(np.average(np.square(values), weights=samples)))
+
+    pooled: dict[str, Any] = {"noise": pool([p["noise"] for _, p in parts])}
+    for mode in MODES:
+        rmse = pool([p[mode]["rmse"] for _, p in parts])
+        spread = pool([p[mode]["spread"] for _, p in parts])
+        exact = pool([p[mode]["exact_rmse"] for _, p in parts])
+        pooled[mode] = {
+            "rmse": rmse,
+            "exact_rmse": exact,
+            "nrmse": rmse / spread if spread > 0.0 else float("nan"),
+            "bias": float(np.average([p[mode]["bias"] for _, p in parts], weights=samples)),
+            "ratio": rmse / exact if exact > 0.0 else float("nan"),
+            "worst_record": max(parts, key=lambda part: part[1][mode]["rmse"])[0],
+        }
+    return pooled
+
+
+def _findings(
+    documents: Sequence[dict[str, Any]],
+    summary: dict[str, dict[str, Any]],
+    maps: dict[str, dict[str, ErrorMap]],
+    settings: Settings,
+) -> list[Finding]:
+    """All sentences, the strongest first."""
+    found: list[Finding] = []
+    for channel, figures in summary.items():
+        unit, at = UNITS[channel], figures["horizon"]
+        size = findings.size_finding(channel, unit, at["rmse"], at["exact_rmse"], figures["noise"], settings.horizon)
+        found.append(size)
+        if size.kind == "at_floor":
+            continue
+        constant = findings.bias_finding(channel, unit, at["bias"], at["rmse"])
+        found += [constant] if constant is not None else []
+        units = {**VARIABLES, "direction": "1"}
+        patterns = [findings.map_finding(channel, unit, v, units[v], m) for v, m in maps[channel].items()]
+        ranked = sorted((p for p in patterns if p is not None), key=lambda p: -p.weight)
+        others = [p for p in ranked if p.kind == "depends_on"]
+        found += [p for p in others[:2] if p.weight >= _SECOND * others[0].weight]
+        found += [p for p in ranked if p.kind == "amplitude"][:1]
+        worst = next(d for d in documents if d["name"] == figures["free_run"]["worst_record"])
+        spectrum = worst["spectra"][channel]
+        banded = findings.frequency_finding(
+            channel, worst["name"], spectrum["frequency"], spectrum["free_run_error"], spectrum["noise"]
+        )
+        found += [banded] if banded is not None else []
+    for document in documents:
+        free = document["channels"]["position"]["free_run"]
+        drift = findings.drift_finding(
+            free["drift"], free["rmse_detrended"], free["rmse"], document["name"], document["duration"]
+        )
+        found += [drift] if drift is not None else []
+    order = {"above_floor": 0, "at_floor": 0, "bias": 1, "depends_on": 1, "amplitude": 2, "frequency": 3, "drift": 4}
+    return sorted(found, key=lambda f: (order[f.kind], -f.weight))
+
+
+def _verdict(summary: dict[str, dict[str, Any]], found: Sequence[Finding], settings: Settings) -> dict[str, Any]:
+    """One sentence on top of the page, and a level: explained, close or off."""
+    at = {name: s["horizon"] for name, s in summary.items()}
+    missed = sorted((n for n in at if at[n]["ratio"] > findings.AT_FLOOR), key=lambda n: -at[n]["ratio"])
+    if not missed:
+        text = f"The model explains these records to within the measurement noise, {settings.horizon:g} s ahead."
+        return {"level": "explained", "text": text}
+    fits = [f"{TITLES[n]} to {percent(1.0 - at[n]['nrmse'])}" for n in HEADLINE if n in at]
+    text = (
+        f"{settings.horizon:g} s ahead the model fits {' and '.join(fits)}. Its errors are up to "
+        f"{number(at[missed[0]]['ratio'])} times ({TITLES[missed[0]]}) what an exact model would show "
+        "at this noise."
+    )
+    patterns = [f for f in found if f.kind in ("bias", "depends_on") and f.weight >= _HEADLINE_SHARE]
+    if patterns:
+        text += f" {patterns[0].text}"
+    else:
+        text += " No single variable explains most of them."
+    return {"level": "close" if all(at[n]["nrmse"] <= _CLOSE for n in missed) else "off", "text": text}

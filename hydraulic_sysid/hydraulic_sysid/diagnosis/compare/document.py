@@ -1,0 +1,112 @@
+"""The part of the result document that belongs to one record."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sim.model_file import Model
+from hydraulic_sysid.data.decimation import trace
+
+from .run import MODES, Compared
+from .spectra import amplitude_density, noise_density
+
+Array = NDArray[np.float64]
+
+
+def record_document(c: Compared, trace_points: int) -> dict[str, Any]:
+    """Figures, traces for plots, spectra and error growth of one record."""
+    record, data = c.data.record, c.data
+    document: dict[str, Any] = {
+        "name": record.name,
+        "source": str(record.source),
+        "sampling_time": record.dt,
+        "samples": len(record),
+        "duration": record.duration,
+        "description": record.description,
+        "velocity_filter_window": data.velocity_filter.window,
+        "channels": {},
+        "drive": trace(record.time, record["drive"], trace_points),
+        "traces": {},
+        "spectra": {},
+        "error_growth": {"lead": c.runs.growth_lead},
+    }
+    for name in data.compared:
+        document["channels"][name] = {"noise": data.noise[name], **{mode: figures(c, mode, name) for mode in MODES}}
+        document["traces"][name] = _traces(c, name, trace_points)
+        document["spectra"][name] = _spectra(c, name)
+        document["error_growth"][name] = {"rms": c.runs.growth_rms[name], "exact_rms": c.twin_runs.growth_rms[name]}
+    return document
+
+
+def figures(c: Compared, mode: str, channel: str) -> dict[str, float]:
+    """Errors of one channel in one mode; ``exact_rmse`` is what an exact model would show at this noise."""
+    error, exact = c.error(mode, channel), c.exact_error(mode, channel)
+    keep = np.isfinite(error)
+    error, y = error[keep], c.data.channels[channel][keep]
+    spread = float(np.linalg.norm(y - y.mean()))
+    found = {
+        "rmse": float(np.sqrt(np.mean(error**2))),
+        "exact_rmse": float(np.sqrt(np.mean(exact[keep] ** 2))),
+        "nrmse": float(np.linalg.norm(error)) / spread if spread > 0.0 else float("nan"),
+        "bias": float(error.mean()),
+        "largest": float(np.abs(error).max()),
+        "spread": spread / np.sqrt(y.size),
+        "samples": int(y.size),
+    }
+    if mode == "free_run":
+        slope, offset = np.polyfit(c.data.record.time[keep], error, 1)
+        left = error - slope * c.data.record.time[keep] - offset
+        found["drift"] = float(slope)
+        found["rmse_detrended"] = float(np.sqrt(np.mean(left**2)))
+        found["nrmse_detrended"] = float(np.linalg.norm(left)) / spread if spread > 0.0 else float("nan")
+    return found
+
+
+def _traces(c: Compared, name: str, points: int) -> dict[str, Any]:
+    time = c.data.record.time
+    traces = {"measured": trace(time, c.data.channels[name], points)}
+    for mode in ("free_run", "horizon"):
+        traces[mode] = trace(time, getattr(c.runs, mode)[name], points)
+        traces[f"{mode}_error"] = trace(time, c.error(mode, name), points)
+    return traces
+
+
+def _spectra(c: Compared, name: str) -> dict[str, Array]:
+    """Amplitude densities; the free run's error without its straight drift, which would leak over all bands."""
+    dt, data = c.data.record.dt, c.data
+    frequency, signal = amplitude_density(data.channels[name], dt)
+    time, free = data.record.time, c.error("free_run", name)
+    free = free - np.polyval(np.polyfit(time, free, 1), time)
+    derivative = data.velocity_filter if name == "velocity" else None
+    sigma = data.noise["position" if derivative else name]
+    return {
+        "frequency": frequency,
+        "measured": signal,
+        "free_run_error": amplitude_density(free, dt)[1],
+        "noise": noise_density(frequency, sigma, dt, derivative),
+    }
+
+
+def model_document(model: Model) -> dict[str, Any]:
+    """Name, effects, parameters and history of a model."""
+    parameters = [
+        {
+            "name": key,
+            "value": model.value(key),
+            "unit": model.parameter(key).unit,
+            "source": model.entry(key).source,
+            "standard_error": model.entry(key).standard_error,
+        }
+        for key in model.keys()  # noqa: SIM118 - a model is no mapping
+    ]
+    return {
+        "name": model.name,
+        "path": str(model.path) if model.path else None,
+        "description": model.description,
+        "effects": list(model.effects),
+        "parameters": parameters,
+        "history": [dict(line) for line in model.history],
+    }

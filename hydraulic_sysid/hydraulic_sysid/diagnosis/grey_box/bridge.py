@@ -1,0 +1,200 @@
+"""A black box on top of the white one: how much is left that the physics does not name.
+
+What a physical model misses of the measurement is, at a finite horizon, either noise (what an exact model would miss
+too), or a function of drive and motion that comes back on fresh data, or neither. A black box fitted to the error and
+tried on data held out tells the second from the third; its terms say what the missing physics looks like. The grey box
+is the sum of both [1, 2].
+
+[1] L. Li, T. Thurner, Accurate modeling and identification of servo-hydraulic cylinder systems (2013).
+[2] L. Jin, Q. Wang, Accurate model identification of the inertial mass dynamic of hydraulic cylinder (2019).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sim.model_file import Model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.decimation import trace
+from hydraulic_sysid.data.display import TITLES
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.results import heading
+from hydraulic_sysid.diagnosis.compare.channels import UNITS
+from hydraulic_sysid.diagnosis.compare.prediction import check
+from hydraulic_sysid.diagnosis.compare.run import Compared, run
+
+from .errors import GreyBoxError
+from .features import Scales, Terms, terms
+from .selection import FOLDS, Selected, select
+from .verdict import shares, verdict
+
+Array = NDArray[np.float64]
+TARGETS = ("velocity", "load_pressure")
+"""Channels whose error is modelled, as far as the records have them. The position's error is the velocity's, summed."""
+STEP_S = 0.01
+BLOCK_S = 0.5
+_SIGNALS = ("velocity", "position", "load_pressure")
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One record, brought to `STEP_S`: signals of the white box, and of every target the error and an exact model's."""
+
+    name: str
+    dt: float
+    time: Array
+    signals: dict[str, Array]
+    error: dict[str, Array]
+    exact: dict[str, Array]
+
+
+def grey_box(
+    model: Model,
+    records: Sequence[Record],
+    held_out: Sequence[Record],
+    horizon: float = 0.5,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Result document: the black box is fitted to the errors on ``records`` and tried on ``held_out``.
+
+    :raises GreyBoxError: no record on either side, or too short ones.
+    :raises ComparisonError: a record that lacks what a comparison needs.
+    """
+    if not records or not held_out:
+        raise GreyBoxError("a grey box needs records to fit and records (or a part of them) held out")
+    plant = Plant(model)
+    parts: list[_Part] = []
+    for record in [*records, *held_out]:
+        check(record, horizon)
+        if progress is not None:
+            progress(record.name)
+        parts.append(_part(run(model, plant, record, horizon, seed=len(parts))))
+    fitted, tried = parts[: len(records)], parts[len(records) :]
+    if sum(p.time.size for p in fitted) * STEP_S < 2 * FOLDS * BLOCK_S:
+        raise GreyBoxError(f"the records to fit are too short: {2 * FOLDS * BLOCK_S:g} s are needed beyond the horizon")
+    scales = Scales.of([p.signals for p in fitted])
+    candidates = [terms(p.signals, p.dt, scales) for p in parts]
+    channels = [name for name in TARGETS if all(name in p.error for p in parts)]
+    found = {name: _channel(name, fitted, tried, candidates) for name in channels}
+    return {
+        **heading("greybox"),
+        "title": f"Grey box on {model.name}",
+        "model": {"name": model.name, "path": str(model.path) if model.path else None, "effects": list(model.effects)},
+        "settings": {"horizon": horizon, "step": STEP_S, "candidates": len(candidates[0].names)},
+        "verdict": verdict(model.name, found),
+        "channels": found,
+        "fitted": [p.name for p in fitted],
+        "held_out": [p.name for p in tried],
+    }
+
+
+def _part(compared: Compared) -> _Part:
+    record = compared.data.record
+    every = max(1, round(STEP_S / record.dt))
+    predicted = compared.runs.horizon
+    signals = {"drive": record["drive"], **{n: predicted[n] for n in _SIGNALS if n in predicted}}
+    targets = [n for n in TARGETS if n in compared.data.compared]
+    error = {n: compared.error("horizon", n) for n in targets}
+    exact = {n: compared.exact_error("horizon", n) for n in targets}
+    finite = np.isfinite(np.column_stack([*signals.values(), *error.values(), *exact.values()])).all(axis=1)
+    keep = np.flatnonzero(finite)
+    if keep.size < 4 * every:
+        raise GreyBoxError(f"{record.name}: nothing is left to compare beyond the horizon")
+    # The horizon's prediction has no value at the beginning only: what is kept is one stretch.
+    stretch = slice(int(keep[0]), int(keep[-1]) + 1)
+
+    def slow(values: dict[str, Array]) -> dict[str, Array]:
+        return {name: _means(x[stretch], every) for name, x in values.items()}
+
+    return _Part(
+        record.name, record.dt * every, _means(record.time[stretch], every), slow(signals), slow(error), slow(exact)
+    )
+
+
+def _means(values: Array, every: int) -> Array:
+    whole = values.size // every * every
+    return values[:whole].reshape(-1, every).mean(axis=1)
+
+
+def _channel(name: str, fitted: Sequence[_Part], tried: Sequence[_Part], candidates: Sequence[Terms]) -> dict[str, Any]:
+    """White, linear grey and grey box of one channel: errors on both sides, and the terms."""
+    known, fresh = candidates[: len(fitted)], candidates[len(fitted) :]
+    values, target = np.vstack([t.values for t in known]), np.concatenate([p.error[name] for p in fitted])
+    blocks = _blocks(fitted)
+    linear = np.flatnonzero(known[0].linear)
+    only_linear = select(values[:, linear], target, blocks)
+    only_linear = replace(only_linear, order=[int(linear[i]) for i in only_linear.order])
+    full = select(values, target, blocks)
+    if only_linear.cross_validated < full.cross_validated:
+        full = only_linear
+    sides = {
+        "fitted": _side(name, fitted, known, only_linear, full),
+        "held_out": _side(name, tried, fresh, only_linear, full),
+    }
+    return {
+        "unit": UNITS[name],
+        "title": TITLES[name],
+        **sides,
+        "shares": shares(sides["held_out"]),
+        "terms": _contributions(name, tried, fresh, full),
+        "records": [
+            {
+                "name": part.name,
+                "traces": {
+                    "white": trace(part.time, part.error[name]),
+                    "black": trace(part.time, full.predict(t.values)),
+                    "grey": trace(part.time, part.error[name] - full.predict(t.values)),
+                },
+            }
+            for part, t in zip(tried, fresh, strict=True)
+        ],
+    }
+
+
+def _side(
+    name: str, parts: Sequence[_Part], candidates: Sequence[Terms], linear: Selected, full: Selected
+) -> dict[str, float]:
+    """RMS of the white box's error, of what the black boxes leave of it, and of an exact model's error."""
+    error = np.concatenate([p.error[name] for p in parts])
+    values = np.vstack([t.values for t in candidates])
+    return {
+        "white": _rms(error),
+        "linear": _rms(error - linear.predict(values)),
+        "grey": _rms(error - full.predict(values)),
+        "exact": _rms(np.concatenate([p.exact[name] for p in parts])),
+    }
+
+
+def _contributions(
+    name: str, parts: Sequence[_Part], candidates: Sequence[Terms], full: Selected
+) -> list[dict[str, Any]]:
+    """Every term with the share of the held-out error that is lost without it."""
+    error = np.concatenate([p.error[name] for p in parts])
+    values = np.vstack([t.values for t in candidates])
+    left, total = error - full.predict(values), float(np.mean(error**2))
+    rows = []
+    for index, coefficient in zip(full.order, full.coefficients, strict=True):
+        own = values[:, index] * coefficient
+        without = float(np.mean((left + own - np.mean(own)) ** 2))
+        gain = (without - float(np.mean(left**2))) / total
+        rows.append({"name": candidates[0].names[index], "coefficient": float(coefficient), "share": gain})
+    return sorted(rows, key=lambda row: -float(row["share"]))
+
+
+def _blocks(parts: Sequence[_Part]) -> NDArray[np.int64]:
+    """Number of the half-second block of every sample, records in a row."""
+    numbers, first = [], 0
+    for part in parts:
+        own = np.floor((part.time - part.time[0]) / BLOCK_S + 1e-9).astype(np.int64)
+        numbers.append(first + own)
+        first += int(own[-1]) + 1
+    return np.concatenate(numbers)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

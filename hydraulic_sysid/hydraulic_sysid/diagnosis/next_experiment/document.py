@@ -1,0 +1,187 @@
+"""A designed experiment as a result document (docs/report-json.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sim.model import Model
+from hydraulic_sysid.data.decimation import trace
+from hydraulic_sysid.data.display import number
+from hydraulic_sysid.data.results import heading
+from hydraulic_sysid.excitation import Plan
+from hydraulic_sysid.excitation.rehearsal import Rehearsal
+
+from .movements import FAMILIES
+from .reference import MARGIN, Played
+from .search import Candidate, Search
+from .verify import Refit
+
+Array = NDArray[np.float64]
+
+CLEAR = 5.0  # mean over standard deviation of the difference of two sums of squares, from which noise cannot decide
+_FAINT = 2.0
+_SHOWN = ("position", "velocity", "pressure_a", "pressure_b")
+_POINTS = 1000
+
+
+@dataclass(frozen=True)
+class Design:
+    """All that a document is made of."""
+
+    rivals: Mapping[str, Model]
+    search: Search
+    candidates: Sequence[Candidate]
+    chosen: Sequence[Candidate]
+    played: Played
+    plan: Plan
+    seen: Sequence[Rehearsal]
+    limited_by: str
+    refits: Sequence[Refit]
+
+    def name(self, point: int) -> str:
+        return self.search.points[point].rival
+
+
+def document(design: Design) -> dict[str, Any]:
+    """The document; arrays NumPy, SI."""
+    plan, search = design.plan, design.search
+    assert plan.prediction is not None
+    return {
+        **heading("next_experiment"),
+        "verdict": _verdict(design),
+        "title": f"Next experiment: {_or(list(design.rivals))}?",
+        "rivals": [
+            {"name": name, "model": model.name, "path": None if model.path is None else str(model.path),
+             "effects": list(model.effects), "fitted": search.points[i].keys}
+            for i, (name, model) in enumerate(design.rivals.items())
+        ],
+        "settings": {
+            "seconds": plan.active_time, "rate": search.bench.rate, "centre": search.bench.centre,
+            "piece": search.length, "margin": 1.0 - MARGIN, "clear": CLEAR,
+        },
+        "noise": dict(search.noise),
+        "limits": asdict(search.limits),
+        "file": None,
+        "plan": {k: v for k, v in plan.as_mapping().items() if k != "prediction"},
+        "prediction": plan.prediction.as_mapping(),
+        "movements": [
+            {"kind": c.movement.kind, "words": c.movement.family.words, "numbers": dict(c.movement.numbers),
+             "start": plan.signal_start + begin / search.bench.rate}
+            for c, begin in zip(design.chosen, design.played.begins, strict=True)
+        ],
+        "pairs": [_pair(design, r) for r in design.refits],
+        "alternatives": _alternatives(design),
+        "traces": {
+            "drive": _traced(design.seen[0], "drive"),
+            **{
+                c: {name: _traced(s, c) for name, s in zip(design.rivals, design.seen, strict=True)}
+                for c in _SHOWN
+                if search.points[0].model.kind == "hydraulic" or not c.startswith("pressure")
+            },
+        },
+    }  # fmt: skip
+
+
+def _pair(design: Design, refit: Refit) -> dict[str, Any]:
+    """One rival refitted to what another does."""
+    t, r = refit.pair
+    model = design.search.points[r].model
+    since = design.plan.signal_start
+    return {
+        "true": design.name(t),
+        "refitted": design.name(r),
+        "chi_square": refit.left,
+        "separation": refit.separation,
+        "mistaken": refit.mistaken,
+        "seconds_needed": _seconds(design, refit),
+        "rms": float(np.sqrt(np.mean(refit.series**2))),
+        "converged": refit.converged,
+        "shares": refit.shares,
+        "parameters": [
+            {"key": k, "unit": model.parameter(k).unit, "before": model.value(k), "after": v}
+            for k, v in refit.values.items()
+        ],
+        "differences": {
+            c: trace(since + refit.times, refit.series[:, i], _POINTS) for i, c in enumerate(refit.channels)
+        },
+    }
+
+
+def _alternatives(design: Design) -> list[dict[str, Any]]:
+    """The best of every kind of movement, repeated over the same time: the least separation of all pairs, best first.
+
+    By the sensitivities at the rivals' parameters; ``chosen`` is the sequence by the same measure.
+    """
+    places, points = len(design.chosen), design.search.points
+    sequence = design.chosen[0].evidence
+    for other in design.chosen[1:]:
+        sequence = sequence + other.evidence
+    best = _least(design, sequence.left(points), 1)
+    rows = [{"kind": "chosen", "words": "the sequence chosen", "numbers": {}, **best}]
+    for kind, family in FAMILIES.items():
+        found = [
+            {"kind": kind, "words": family.words, "numbers": dict(c.movement.numbers),
+             **_least(design, c.evidence.left(points), places)}
+            for c in design.candidates
+            if c.movement.kind == kind
+        ]  # fmt: skip
+        if found:
+            rows.append(max(found, key=lambda row: row["separation"]))
+    return [rows[0], *sorted(rows[1:], key=lambda row: -row["separation"])]
+
+
+def _least(design: Design, left: Mapping[tuple[int, int], float], times: int) -> dict[str, Any]:
+    pair = min(left, key=lambda p: left[p])
+    return {
+        "separation": 0.5 * float(np.sqrt(times * left[pair])),
+        "true": design.name(pair[0]),
+        "refitted": design.name(pair[1]),
+    }
+
+
+def _seconds(design: Design, refit: Refit) -> float:
+    """How long the experiment must be repeated until the separation is clear [s]."""
+    return design.plan.active_time * CLEAR**2 / refit.separation**2 if refit.separation > 0.0 else float("inf")
+
+
+def _verdict(design: Design) -> dict[str, str]:
+    worst = min(design.refits, key=lambda r: r.left)
+    t, r = (design.name(i) for i in worst.pair)
+    seconds = design.plan.active_time
+    last = (
+        f"the closest two are {t} (true) and {r} (refitted)"
+        if len(design.rivals) > 2
+        else (f"the harder way round is {r} refitted to {t}")
+    )
+    level = "explained" if worst.separation >= CLEAR else "close" if worst.separation >= _FAINT else "off"
+    apart = f"{number(worst.separation)} standard deviations of the noise apart after every refit ({last})"
+    what = f"{number(seconds)} s of {_and(list(dict.fromkeys(c.movement.family.words for c in design.chosen)))}"
+    if level == "explained":
+        text = f"{what} tell{'s' if ' and ' not in what else ''} {_and(list(design.rivals))} apart: {apart}."
+    elif level == "close":
+        text = f"{what} hint at which of {_or(list(design.rivals))} it is: {apart}; about " + (
+            f"{number(_seconds(design, worst))} s of it decide."
+        )
+    else:
+        text = (
+            f"No experiment within the limits was found that tells {_or(list(design.rivals))} apart with these "
+            f"channels in {number(seconds)} s: at best they are {apart}."
+        )
+    return {"level": level, "text": text[:1].upper() + text[1:]}
+
+
+def _traced(seen: Rehearsal, channel: str) -> dict[str, Any]:
+    return trace(seen.record.time, seen.record[channel], _POINTS)
+
+
+def _and(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _or(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"

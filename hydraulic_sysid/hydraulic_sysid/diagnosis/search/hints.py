@@ -1,0 +1,85 @@
+"""What records show by themselves: lines in the spectrum of what a model leaves, and the position's resolution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from hydraulic_sysid.estimation.noise import code_step
+from hydraulic_sysid.estimation.segments import Pieces
+
+from .anchor import Anchor
+from .candidates import Hints
+
+Array = NDArray[np.float64]
+
+STANDS_OUT = 30.0  # power of a line over the median around it
+_AROUND = 201  # bins
+_FINER = 4  # zero padding: bins between those of a record
+_BESIDE = 3.0  # Hz, within which side bands of a line lie
+_MOST = 2
+_SLOWEST = 2.0  # Hz, slower is drift within a piece
+
+
+def hints(anchor: Anchor) -> Hints:
+    """Lines, and the step between position readings that all records share (0 where they have none)."""
+    steps = [code_step(p.record["position"]) for p in anchor.split.pieces]
+    shared = float(np.median(steps)) if max(steps) < 1.01 * min(steps) else 0.0
+    return Hints(spectral_lines(anchor), shared)
+
+
+def spectral_lines(anchor: Anchor) -> tuple[float, ...]:
+    """The strongest lines [Hz], at most two. Records shorter than a second show none.
+
+    What is periodic in the plant acts through a valve that reverses: of a line that leaves side bands, often higher
+    than itself. They fall together again where the residual is turned over with the drive, and each record has its own;
+    so the line is where the residual and the turned one, of all records, stand out most.
+    """
+    spectra = [found for found in map(_spectrum, anchor.split.pieces, anchor.residual) if found is not None]
+    peaks = sorted(((float(s.clear.max()), float(s.frequency[np.argmax(s.clear)])) for s in spectra), reverse=True)
+    distinct: list[float] = []
+    for height, at in peaks:
+        if height <= STANDS_OUT or len(distinct) == _MOST:
+            break
+        finest = max(spectra, key=lambda s: len(s.frequency)).frequency
+        grid = finest[(np.abs(finest - at) <= _BESIDE) & (finest > _SLOWEST)]
+        score = sum(np.interp(grid, s.frequency, s.ratio) for s in spectra)
+        line = float(grid[np.argmax(score)])
+        if all(abs(line - other) > 0.02 * other for other in distinct):
+            distinct.append(line)
+    return tuple(distinct)
+
+
+@dataclass(frozen=True)
+class _Spectrum:
+    """Of one record, over the median power around: the residual (``clear``), and with the turned one (``ratio``)."""
+
+    frequency: Array
+    clear: Array
+    ratio: Array
+
+
+def _spectrum(pieces: Pieces, residual: Array) -> _Spectrum | None:
+    values = residual[:, : -len(pieces.free)].reshape(len(pieces.starts), pieces.samples, len(pieces.channels))
+    run = values[:, :-1].reshape(-1, len(pieces.channels)).astype(float)
+    if len(run) < 5 * _AROUND:
+        return None
+    drive = pieces.record["drive"][pieces.starts[:, None] + np.arange(pieces.samples - 1)].reshape(-1)
+    way = np.sign(drive)
+    way = way - way.mean()
+    way /= max(float(np.sqrt(np.mean(way**2))), 1e-9)
+    frequency: Array = np.fft.rfftfreq(_FINER * len(run), pieces.record.dt).astype(np.float64)
+    plain, turned = _power(run), _power(run * way[:, None])
+    around = np.repeat(np.asarray(median_filter(plain[::_FINER], _AROUND), dtype=float), _FINER)[: len(plain)]
+    within = frequency > _SLOWEST
+    floor = np.maximum(around, 1e-300)
+    return _Spectrum(frequency, np.where(within, plain / floor, 0.0), np.where(within, (plain + turned) / floor, 0.0))
+
+
+def _power(run: Array) -> Array:
+    window = np.hanning(len(run))[:, None]
+    transformed = np.fft.rfft(run * window, _FINER * len(run), axis=0)
+    return np.sum(np.abs(transformed) ** 2, axis=1, dtype=np.float64)

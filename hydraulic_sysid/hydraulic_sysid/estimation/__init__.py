@@ -1,0 +1,1 @@
+"""The numerical core: segments, their simulation, least squares within bounds, noise, uncertainty."""

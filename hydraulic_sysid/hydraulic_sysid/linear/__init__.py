@@ -1,0 +1,1 @@
+"""Linear models: frequency responses, identification, validation, and estimation while the bench runs."""

@@ -1,0 +1,280 @@
+"""Identify a linear model from records and try it on held-out data: every figure in one document."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydraulic_sysid.data.decimation import trace
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.resampling import held_average, sampled
+from hydraulic_sysid.data.results import heading
+from hydraulic_sysid.estimation.noise import noise_floor
+
+from . import metrics
+from .models import (
+    CRITERIA,
+    Arx,
+    Candidate,
+    IdentificationError,
+    LinearModel,
+    Structure,
+    TransferFunctionModel,
+    best,
+    try_orders,
+)
+from .validation import residual_tests
+
+Array = NDArray[np.float64]
+
+_UNSTABLE = 1.01  # |z|; an estimated integrator may come out a little beyond 1
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a user may choose about an identification."""
+
+    structure: Structure = Arx()
+    sampling_time: float = 0.05
+    """Seconds; the records are brought to it (see `resampling`)."""
+    holdout: float = 0.2
+    """Last part of every record that is kept from the fit, unless records are held out as a whole."""
+    offsets: str = "estimate"
+    select: str | None = None
+    """Choose the order, up to that of ``structure``, by one of `linear_models.CRITERIA`."""
+    input: str = "drive"
+    output: str = "position"
+
+
+@dataclass(frozen=True)
+class _Series:
+    """One stretch of a record at the model's sampling time."""
+
+    record: Record
+    u: Array
+    y: Array
+
+
+def identify(
+    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: Settings | None = None
+) -> dict[str, Any]:
+    """Result document of a linear model fitted to ``records`` and tried on ``held_out``.
+
+    Without ``held_out`` the last part of every record is kept from the fit and tried on.
+
+    :raises IdentificationError: no record, a channel missing, too little or too poor data, an impossible
+    sampling time or criterion.
+    """
+    return identify_model(records, held_out, settings)[0]
+
+
+def identify_model(
+    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: Settings | None = None
+) -> tuple[dict[str, Any], LinearModel]:
+    """As `identify`; the model too."""
+    settings = settings or Settings()
+    if not records:
+        raise IdentificationError("there is no record to identify from")
+    if held_out is None:
+        if not 0.0 < settings.holdout < 1.0:
+            raise IdentificationError(f"holdout is {settings.holdout:g}: a part between 0 and 1 is allowed")
+        parts = [record.split(1.0 - settings.holdout) for record in records]
+        records, held_out = [first for first, _ in parts], [last for _, last in parts]
+    fit_on = [_series(record, settings) for record in records]
+    try_on = [_series(record, settings) for record in held_out]
+    data = [s.u for s in fit_on], [s.y for s in fit_on], settings.sampling_time, settings.offsets
+    structure, tried = settings.structure, None
+    if settings.select is not None:
+        candidates = try_orders(structure.up_to(), *data)
+        structure = best(candidates, settings.select).structure
+        tried = _orders(candidates)
+    model = structure.fit(*data)
+    estimation = [_figures(model, s, noise_floor_of(s, settings)) for s in fit_on]
+    validation = [_figures(model, s, noise_floor_of(s, settings)) for s in try_on]
+    fpe = metrics.fpe(model.loss, model.parameters, model.samples)
+    result = {
+        **heading("identify", 2),
+        "settings": {
+            "structure": {"text": structure.text, **structure.document()},
+            "sampling_time": settings.sampling_time,
+            "offsets": settings.offsets,
+            "select": settings.select,
+            "input": {"channel": settings.input, "unit": records[0].unit(settings.input)},
+            "output": {"channel": settings.output, "unit": records[0].unit(settings.output)},
+        },
+        "verdict": _verdict(structure, model, validation),
+        "model": _model_document(model),
+        "orders": tried,
+        "estimation": {**_pooled(estimation), "mse": model.loss, "fpe": fpe, "records": estimation},
+        "validation": {**_pooled(validation), "fpe": fpe, "records": validation},
+    }
+    return result, model
+
+
+def about(result: dict[str, Any]) -> dict[str, Any]:
+    """What a model's file says besides the model: name, channels and units, orders, data, and how well it fits."""
+    settings, held = result["settings"], result["validation"]
+    ends = f"{settings['input']['channel']} to {settings['output']['channel']}"
+    return {
+        "name": f"{settings['structure']['text']} from {ends}",
+        "created": result["created"],
+        "software": result["software"],
+        "input": settings["input"],
+        "output": settings["output"],
+        "orders": settings["structure"],
+        "records": [r["source"] for r in result["estimation"]["records"]],
+        "held_out": {
+            key: held[key] for key in ("best_fit_free_run", "best_fit_one_step", "mse_free_run", "mse_one_step", "fpe")
+        },
+    }
+
+
+def _orders(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
+    """Rows of the table of orders, each with the criteria that would choose it."""
+    chosen: dict[int, list[str]] = {}
+    for criterion in CRITERIA:
+        if any(np.isfinite(getattr(c, criterion)) for c in candidates):
+            chosen.setdefault(id(best(candidates, criterion)), []).append(criterion)
+    return [
+        {
+            "text": c.structure.text,
+            **c.structure.document(),
+            **{key: getattr(c, key) for key in ("parameters", "loss", "fpe", "aic", "bic", "cv")},
+            "best_by": chosen.get(id(c), []),
+        }
+        for c in candidates
+    ]
+
+
+def noise_floor_of(series: _Series, settings: Settings) -> float:
+    """Noise of the output as recorded."""
+    return noise_floor(series.record[settings.output])
+
+
+def _series(record: Record, settings: Settings) -> _Series:
+    for channel in (settings.input, settings.output):
+        if channel not in record:
+            raise IdentificationError(
+                f"{record.name}: no channel {channel!r}; the record has {', '.join(sorted(record.channels))}"
+            )
+    try:
+        u = held_average(record[settings.input], record.dt, settings.sampling_time)
+        y = sampled(record[settings.output], record.dt, settings.sampling_time)
+    except ValueError as error:
+        raise IdentificationError(f"{record.name}: {error}") from None
+    shortest = 2 * settings.structure.memory + 2
+    if u.size < shortest:
+        raise IdentificationError(
+            f"{record.name}: {u.size} samples at {settings.sampling_time:g} s are too few (at least "
+            f"{shortest}): hold out a larger part or shorten the sampling time"
+        )
+    return _Series(record, u, y)
+
+
+def _figures(model: LinearModel, series: _Series, noise: float) -> dict[str, Any]:
+    free = model.simulate(series.u, series.y)
+    one = model.predict(series.u, series.y)
+    past = model.memory
+    if not np.isfinite(free).all():
+        free = np.full_like(series.y, np.nan)  # an unstable model has no free run worth a figure
+    runs = bool(np.isfinite(free).all())
+    residual = (series.y - one)[past:]
+    time = series.record.time[0] + model.dt * np.arange(series.y.size)
+    return {
+        "name": series.record.name,
+        "source": str(series.record.source),
+        "samples": series.y.size,
+        "duration": series.y.size * model.dt,
+        "noise": noise,
+        "best_fit_free_run": metrics.best_fit(series.y, free) if runs else float("nan"),
+        "best_fit_one_step": _or_nan(metrics.best_fit, series.y[past:], one[past:]),
+        "mse_free_run": metrics.mse(series.y, free) if runs else float("nan"),
+        "mse_one_step": _or_nan(metrics.mse, series.y[past:], one[past:]),
+        "r_squared_free_run": metrics.r_squared(series.y, free) if runs else float("nan"),
+        "r_squared_one_step": _or_nan(metrics.r_squared, series.y[past:], one[past:]),
+        "residual_tests": residual_tests(residual, series.u[past:]) if np.isfinite(residual).all() else None,
+        "free_run_tests": residual_tests(series.y - free, series.u) if runs else None,
+        "traces": {
+            "input": trace(time, series.u),
+            "measured": trace(time, series.y),
+            "free_run": trace(time, free),
+            "one_step": trace(time, one),
+            "free_run_error": trace(time, series.y - free),
+            "one_step_error": trace(time, series.y - one),
+        },
+    }
+
+
+def _or_nan(figure: Callable[[Array, Array], float], measured: Array, predicted: Array) -> float:
+    """A figure of merit; NaN where an unstable model predicts nothing."""
+    return figure(measured, predicted) if np.isfinite(predicted).all() else float("nan")
+
+
+def _pooled(parts: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """Mean square errors over all held-out samples, and the smallest and the mean best fit of the records."""
+    samples = [p["samples"] for p in parts]
+    return {
+        "samples": int(sum(samples)),
+        "mse_one_step": float(np.average([p["mse_one_step"] for p in parts], weights=samples)),
+        "mse_free_run": float(np.average([p["mse_free_run"] for p in parts], weights=samples)),
+        "best_fit_free_run": float(np.mean([p["best_fit_free_run"] for p in parts])),
+        "best_fit_one_step": float(np.mean([p["best_fit_one_step"] for p in parts])),
+        "worst_best_fit_free_run": float(min(p["best_fit_free_run"] for p in parts)),
+    }
+
+
+def _model_document(model: LinearModel) -> dict[str, Any]:
+    numerator, denominator = model.transfer_function()
+    continuous = isinstance(model, TransferFunctionModel)
+    return {
+        "type": type(model).__name__.removesuffix("Model"),
+        "coefficients": [
+            {"name": name, "value": value, "standard_error": error} for name, value, error in model.coefficients()
+        ],
+        "minimised": model.minimised,
+        "parameters": model.parameters,
+        "input_offset": model.input_offset,
+        "output_offset": model.output_offset,
+        "transfer_function": {
+            "numerator": numerator,
+            "denominator": denominator,
+            "domain": "continuous" if continuous else "discrete",
+            "sampling_time": model.dt,
+            "delay": model.delay if isinstance(model, TransferFunctionModel) else 0.0,
+        },
+        "poles": [
+            {
+                "real": p.value.real,
+                "imaginary": p.value.imag,
+                "natural_frequency_hz": p.natural_frequency,
+                "damping": p.damping,
+                "stable": p.stable,
+            }
+            for p in model.poles()
+        ],
+        "condition_number": getattr(model, "condition_number", None),
+        "singular_values": getattr(model, "singular_values", None),
+    }
+
+
+def _verdict(structure: Structure, model: LinearModel, validation: Sequence[dict[str, Any]]) -> dict[str, str]:
+    name = f"{structure.text[0].upper()}{structure.text[1:]} at {model.dt * 1e3:g} ms"
+    fits = [p["best_fit_free_run"] for p in validation]
+    one_step = np.mean([p["best_fit_one_step"] for p in validation])
+    # What growth a continuous pole's s means per sample.
+    growth = [abs(p.value) if p.sampled else float(np.exp(p.value.real * model.dt)) for p in model.poles()]
+    if max(growth) > _UNSTABLE or not np.isfinite(fits).all():
+        text = (
+            f"{name} is unstable (pole at |z| = {max(growth):.3g}): its free run says "
+            f"nothing, one step ahead it fits held-out data to {one_step:.1f} %. Try another sampling time or "
+            "order, or a richer drive."
+        )
+        return {"level": "off", "text": text}
+    where = "held-out data" if len(fits) == 1 else f"{len(fits)} held-out records (mean; worst {min(fits):.1f} %)"
+    text = f"{name} fits {where} to {np.mean(fits):.1f} % in free run and {one_step:.1f} % one step ahead."
+    level = "explained" if min(fits) >= 95.0 else "close" if min(fits) >= 80.0 else "off"
+    return {"level": level, "text": text}
