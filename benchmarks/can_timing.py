@@ -27,7 +27,7 @@ import can
 
 from hydraulic_can_driver.can_bus import hears_itself, open_can
 from hydraulic_can_driver.supervision import LATE
-from hydraulic_interfaces.pacing import Pacer, Wakefulness, request_realtime
+from hydraulic_plant_node.pacing import Pacer, Wakefulness, request_realtime
 
 SYNC, DRIVE, ANSWERS = 0x80, 0x510, (0x490, 0x1A0, 0x1B0, 0x1B1, 0x1B2)
 WITHIN = 0.8

@@ -32,9 +32,9 @@ from hydraulic_interfaces.conversions import (
     interface_class,
     sample_to_messages,
 )
-from hydraulic_interfaces.nodes.mailbox import Mailbox
 from hydraulic_interfaces.qos import profile
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.nodes.mailbox import Mailbox
 
 STREAMS = ("state", "pressure_a", "pressure_b", "pressure_supply", "command")
 PERIOD_NS = 1_000_000

@@ -18,7 +18,7 @@ from hydraulic_can_driver.frames import Frames
 from hydraulic_can_driver.kernel_timer import Trim, set_period
 from hydraulic_can_driver.master import Master
 from hydraulic_can_driver.receiver import SYNC
-from hydraulic_interfaces.pacing import Pacer
+from hydraulic_plant_node.pacing import Pacer
 
 # How long before the SYNC the drive is sent, as a share of the period: the frame itself (100 us at 1 Mbit/s) and the
 # jitter of the loop must fit; only that of sending where the loop sends both.

@@ -18,7 +18,7 @@ import numpy as np
 
 from hydraulic_control.errors import HydraulicControlError
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
-from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 CONTROLLERS = ("npid", "pid", "pole_placement")
 ANTIWINDUP = ("none", "back_calculation", "conditional_integration")

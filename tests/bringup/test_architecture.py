@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,20 +15,28 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 # A package and those below it: an import runs down, never up or sideways.
-BELOW = {
+GROUND = {"hydraulic_interfaces", "hydraulic_node_utils"}
+BELOW: dict[str, set[str]] = {
     "hydraulic_interfaces": set(),
-    "hydraulic_sim": {"hydraulic_interfaces"},
-    "hydraulic_sysid": {"hydraulic_interfaces", "hydraulic_sim"},
-    "hydraulic_control": {"hydraulic_interfaces", "hydraulic_sim"},
-    "hydraulic_can_driver": {"hydraulic_interfaces"},
-    "hydraulic_bringup": {
-        "hydraulic_interfaces",
-        "hydraulic_sim",
-        "hydraulic_sysid",
-        "hydraulic_control",
-        "hydraulic_can_driver",
-    },
+    "hydraulic_node_utils": set(),
+    "hydraulic_plant_node": GROUND,
+    "hydraulic_sim": {*GROUND, "hydraulic_plant_node"},
+    "hydraulic_sysid": {*GROUND, "hydraulic_sim"},
+    "hydraulic_control": {*GROUND, "hydraulic_plant_node", "hydraulic_sim"},
+    "hydraulic_can_driver": {*GROUND, "hydraulic_plant_node"},
 }
+BELOW["hydraulic_bringup"] = set(BELOW)
+
+# The wings of hydraulic_sysid and those below each. The report shows result documents and knows nothing else.
+WINGS_BELOW: dict[str, set[str]] = {
+    "data": set(),
+    "estimation": {"data"},
+    "excitation": {"data", "estimation"},
+    "linear": {"data", "estimation", "excitation"},
+    "diagnosis": {"data", "estimation", "excitation", "linear"},
+    "report": {"data"},
+}
+WINGS_BELOW["verbs"] = WINGS_BELOW["nodes"] = set(WINGS_BELOW)
 FOLDERS = {name: (ROOT / "ros_ws" / "src" / name).resolve() / name for name in BELOW}
 
 # The contract is where messages become plain values; everything else that knows ROS is a node.
@@ -85,6 +94,50 @@ def ros_violations(package: str, file: Path, text: str) -> list[str]:
 def test_imports_run_down(package: str) -> None:
     found = [v for file in modules(package) for v in floor_violations(package, file, file.read_text("utf-8"))]
     assert found == []
+
+
+def wing_violations(file: Path, text: str) -> list[str]:
+    """Imports of a module of hydraulic_sysid, absolute or relative, that do not run down between its wings."""
+    place = file.relative_to(FOLDERS["hydraulic_sysid"])
+    wing, folder = place.parts[0], ["hydraulic_sysid", *place.parts[:-1]]
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom):
+            base = folder[: len(folder) - node.level + 1] if node.level else []
+            stem = [*base, *(node.module or "").split(".")] if node.module else base
+            targets = [[*stem, alias.name] for alias in node.names]
+        elif isinstance(node, ast.Import):
+            targets = [alias.name.split(".") for alias in node.names]
+        else:
+            continue
+        other = {t[1] for t in targets if t[0] == "hydraulic_sysid" and len(t) > 1} - {wing}
+        found += [f"{place}:{node.lineno} imports {o}" for o in sorted(other) if o not in WINGS_BELOW[wing]]
+    return found
+
+
+def test_imports_between_wings_run_down() -> None:
+    inside = [f for f in modules("hydraulic_sysid") if f.parent != FOLDERS["hydraulic_sysid"]]
+    assert [v for file in inside for v in wing_violations(file, file.read_text("utf-8"))] == []
+
+
+def test_bags_know_nothing_of_records() -> None:
+    for file in sorted((FOLDERS["hydraulic_sysid"] / "data" / "bag").glob("*.py")):
+        assert not re.search(r"^\s*from (hydraulic_sysid\.data|\.)\.records", file.read_text("utf-8"), re.MULTILINE), file
+
+
+@pytest.mark.parametrize(
+    ("place", "text", "found"),
+    [
+        ("data/bag/reader.py", "from hydraulic_sysid.linear.models import arx", 1),
+        ("data/bag/reader.py", "from ...estimation import noise", 1),
+        ("report/page.py", "from hydraulic_sysid import diagnosis, data", 1),
+        ("diagnosis/search/search.py", "from ..calibrate import document\nimport hydraulic_sysid.linear.models", 0),
+        ("verbs/diagnose.py", "from hydraulic_sysid.diagnosis.search import diagnose", 0),
+        ("nodes/recorder.py", "from hydraulic_sysid.verbs import recover", 1),
+    ],
+)
+def test_the_wing_rule_sees(place: str, text: str, found: int) -> None:
+    assert len(wing_violations(FOLDERS["hydraulic_sysid"] / place, text)) == found
 
 
 @pytest.mark.parametrize("package", BELOW)

@@ -91,7 +91,7 @@ def test_parameters_that_are_set_are_declared() -> None:
     pytest.importorskip("rclpy")
     from hydraulic_can_driver.nodes import can_driver
     from hydraulic_control.nodes import controller, reference
-    from hydraulic_interfaces.nodes import plant_node
+    from hydraulic_plant_node.nodes import plant_node
     from hydraulic_sim.nodes import simulator
     from hydraulic_sysid.nodes import estimator, excitation, recorder
 
@@ -119,7 +119,7 @@ def test_parameters_that_are_set_are_declared() -> None:
 def test_parameter_files_fit_their_nodes(plant: str) -> None:
     pytest.importorskip("rclpy")
     from hydraulic_can_driver.nodes import can_driver
-    from hydraulic_interfaces.nodes import plant_node
+    from hydraulic_plant_node.nodes import plant_node
     from hydraulic_sim.nodes import simulator
 
     own = {"sim": simulator.PARAMETERS, "can": can_driver.PARAMETERS}[plant]

@@ -94,7 +94,7 @@ def check_node(module: str, arguments: list[str]) -> None:
     loaded = importlib.import_module(module)
     declared = {spec.name: spec for spec in loaded.PARAMETERS}
     if hasattr(loaded, "run_plant"):
-        common = importlib.import_module("hydraulic_interfaces.nodes.plant_node").PARAMETERS
+        common = importlib.import_module("hydraulic_plant_node.nodes.plant_node").PARAMETERS
         declared |= {spec.name: spec for spec in common}
     own, _, ros = " ".join(arguments).partition("--ros-args")
     assert set(own.split()) <= ({"--autostart"} if hasattr(loaded, "run_plant") else set())

@@ -16,9 +16,9 @@ from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus import Bus
 from hydraulic_can_driver.nodes.can_driver import CanPlant
 from hydraulic_can_driver.sync import KernelBeat
-from hydraulic_interfaces.command_gate import CommandGate
-from hydraulic_interfaces.plant_loop import LoopTiming, PlantLoop
 from hydraulic_interfaces.samples import Command, PlantSample
+from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.plant_loop import LoopTiming, PlantLoop
 
 RATE = 50.0
 PERIOD = round(1e9 / RATE)

@@ -17,7 +17,7 @@ HERE = Path(__file__).parent
 
 PLANTS: dict[str, tuple[str, ...]] = {
     "can": (str(HERE / "can_plant.py"),),
-    "integrator": (str(HERE.parent / "interfaces" / "integrator_plant.py"),),
+    "integrator": (str(HERE.parent / "plant_node" / "integrator_plant.py"),),
     "sim": ("hydraulic_sim.nodes.simulator",),
 }
 # Long enough for a source in a loaded test process not to be taken for silent.

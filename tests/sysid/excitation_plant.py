@@ -7,10 +7,10 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hydraulic_interfaces.nodes.running import run_plant
-from hydraulic_interfaces.parameter_spec import ParameterSpec
-from hydraulic_interfaces.plant_backend import PlantBackend
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_plant_node.nodes.running import run_plant
+from hydraulic_plant_node.plant_backend import PlantBackend
 
 SPEED_GAIN = 0.03  # m/s per volt
 

@@ -98,7 +98,7 @@ def test_output_into_a_pipe_that_closes_is_no_error(tmp_path: Path) -> None:
     script = tmp_path / "verb.py"
     script.write_text(
         "import sys\n"
-        "from hydraulic_sysid import cli\n"
+        "from hydraulic_sysid.verbs import _cli as cli\n"
         "def action(options):\n"
         "    sys.stdin.read()\n"  # ends once the reader of our output has gone
         "    print('x' * 100_000)\n"

@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sysid.excitation import (
     ExcitationError,
     Plan,
@@ -180,7 +180,7 @@ def test_a_playback_counts_its_path_from_the_plan(tmp_path):
 
 
 def test_what_a_command_line_says_of_a_bad_plan_is_one_line_of_the_user(tmp_path):
-    with pytest.raises(HydraulicSysidError):
+    with pytest.raises(HydraulicError):
         load_plan(tmp_path / "none.yaml")
 
 

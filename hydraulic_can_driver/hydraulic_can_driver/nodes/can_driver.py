@@ -12,10 +12,10 @@ from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_can_driver.cia408 import State, describe
 from hydraulic_can_driver.sync import KernelBeat
-from hydraulic_interfaces.nodes.running import run_plant
-from hydraulic_interfaces.parameter_spec import ParameterSpec
-from hydraulic_interfaces.plant_backend import PlantBackend
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_plant_node.nodes.running import run_plant
+from hydraulic_plant_node.plant_backend import PlantBackend
 
 PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("bus", "bench", "bus file, or the name of a shipped one"),

@@ -11,8 +11,8 @@ from rclpy.parameter import Parameter
 from hydraulic_control import gains_file
 from hydraulic_control.parameters import LAW, SPECS, check
 from hydraulic_control.session import ControlSession
-from hydraulic_interfaces.nodes.parameters import ParameterTable
-from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 SAFETY: tuple[ParameterSpec, ...] = (
     ParameterSpec("age_limit", 0.02, "age of a state, or silence, that gives 0 V", "s", 1e-3, 1.0, live=True),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hydraulic_control.trajectories import KINDS
-from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 PARAMETERS = (
     ParameterSpec("kind", "step", f"trajectory: {', '.join(KINDS)}", live=True),

@@ -26,10 +26,10 @@ from hydraulic_interfaces.conversions import (
     reference_from_message,
     sample_from_messages,
 )
-from hydraulic_interfaces.nodes.guarded_lifecycle import guard_transitions
-from hydraulic_interfaces.nodes.serving import Served, serve
-from hydraulic_interfaces.pacing import release_realtime_for_all, request_realtime_for_all
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes.guarded_lifecycle import guard_transitions
+from hydraulic_node_utils.nodes.serving import Served, serve
+from hydraulic_plant_node.pacing import release_realtime_for_all, request_realtime_for_all
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 HEALTH_PERIOD_S = 0.5

@@ -23,9 +23,9 @@ from hydraulic_control.reference_run import ReferenceRun
 from hydraulic_control.trajectories import Limits
 from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE, absolute
 from hydraulic_interfaces.conversions import MessageError, ReferenceEncoder, sample_from_messages, to_time
-from hydraulic_interfaces.nodes.parameters import ParameterTable
-from hydraulic_interfaces.nodes.serving import ServedNode, serve
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.nodes.serving import ServedNode, serve
 
 HEALTH_PERIOD_S = 0.5
 STATE_DEPTH = 10

@@ -19,11 +19,11 @@ from sensor_msgs.msg import JointState
 from hydraulic_control.relay import Relay, RelaySettings
 from hydraulic_interfaces.contract import NAMESPACE, RELAY_NODE
 from hydraulic_interfaces.conversions import CommandEncoder, MessageError, sample_from_messages
-from hydraulic_interfaces.nodes.parameters import ParameterTable
-from hydraulic_interfaces.nodes.serving import ServedNode, serve
-from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.qos import profile
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.nodes.serving import ServedNode, serve
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 _USUAL = RelaySettings()
 PARAMETERS = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from hydraulic_interfaces.plant_backend import BackendError
+from hydraulic_plant_node.plant_backend import BackendError
 from hydraulic_sim.model import Model
 
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from hydraulic_interfaces.nodes.running import run_plant
-from hydraulic_interfaces.parameter_spec import ParameterSpec
-from hydraulic_interfaces.plant_backend import BackendError, PlantBackend
 from hydraulic_interfaces.samples import NAN, PlantSample
+from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_plant_node.nodes.running import run_plant
+from hydraulic_plant_node.plant_backend import BackendError, PlantBackend
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.nodes._extra_effects import switched

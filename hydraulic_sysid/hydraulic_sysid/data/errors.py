@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_interfaces.errors import HydraulicError
 
 
-class RecordError(HydraulicSysidError, ValueError):
+class RecordError(HydraulicError, ValueError):
     """Base of all: a record, or something asked of it, is not acceptable.
 
     The message says where (file, row or sample, column or channel), the value found and what is allowed.

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_interfaces.errors import HydraulicError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -40,7 +40,7 @@ _DENSE = 10  # points between two lines
 _LOW = 3.0  # lines up to so many times the lowest count as low frequencies
 
 
-class BandwidthError(HydraulicSysidError, ValueError):
+class BandwidthError(HydraulicError, ValueError):
     """The response does not reach where the bandwidth is; the message says which end is missing."""
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_interfaces.errors import HydraulicError
 
 
-class ExcitationError(HydraulicSysidError, ValueError):
+class ExcitationError(HydraulicError, ValueError):
     """Base of everything that excitation plans and runs raise."""
 
 

@@ -13,9 +13,9 @@ from hydraulic_sysid.data.decimation import trace
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.resampling import held_average, sampled
 from hydraulic_sysid.data.results import heading
+from hydraulic_sysid.estimation import metrics
 from hydraulic_sysid.estimation.noise import noise_floor
 
-from . import metrics
 from .models import (
     CRITERIA,
     Arx,

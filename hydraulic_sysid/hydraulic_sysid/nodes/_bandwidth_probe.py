@@ -14,9 +14,9 @@ from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_interfaces.qos import profile
 from hydraulic_interfaces.samples import PlantSample
-from hydraulic_sysid.errors import HydraulicSysidError
 from hydraulic_sysid.excitation import ExcitationError, Plan, load_plan
 
 _CURVES = ("frequency", "response", "closed_loop", "coherence", "schema", "software")
@@ -80,7 +80,7 @@ def _found(plan: Plan, rows: list[tuple[int, float, float]]) -> dict[str, object
     record = Record.sampled(plan.name, 1.0 / plan.rate, channels, description=description)
     try:
         bandwidth, coherence = from_record(record)
-    except HydraulicSysidError as error:
+    except HydraulicError as error:
         return {"event": FAILED, "reason": str(error)}
     whole = document(bandwidth, {"kind": "record", "name": plan.name, "path": ""}, coherence)
     return {"event": "finished", "reason": "", **plain({k: v for k, v in whole.items() if k not in _CURVES})}

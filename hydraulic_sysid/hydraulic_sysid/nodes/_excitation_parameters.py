@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_sysid.excitation import shipped_plans
 
 PARAMETERS = (

@@ -9,8 +9,8 @@ from rclpy.qos import DurabilityPolicy
 
 from hydraulic_interfaces.contract import TOPICS, Topic, absolute, topic
 from hydraulic_interfaces.conversions import interface_class
-from hydraulic_interfaces.nodes.mailbox import Mailbox
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes.mailbox import Mailbox
 from hydraulic_sysid.data.bag import BagTopic, ExperimentLog, Recording, message_type, offered_qos
 from hydraulic_sysid.data.bag.continuity import Continuity
 from hydraulic_sysid.data.bag.types import header_stamp

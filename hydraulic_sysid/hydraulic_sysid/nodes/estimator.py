@@ -18,11 +18,11 @@ from std_srvs.srv import Trigger
 
 from hydraulic_interfaces.contract import ESTIMATOR_NODE, NAMESPACE
 from hydraulic_interfaces.conversions import MessageError, StateEncoder, sample_from_messages
-from hydraulic_interfaces.nodes.parameters import ParameterTable
-from hydraulic_interfaces.nodes.serving import ServedNode, serve
-from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.qos import STREAM_HISTORY, profile
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.nodes.serving import ServedNode, serve
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.linear.models import ArxOrder, IdentificationError
 from hydraulic_sysid.linear.online import LiveModel, RunningArx

@@ -19,9 +19,9 @@ from std_srvs.srv import Trigger
 
 from hydraulic_interfaces.contract import EXCITATION_NODE, NAMESPACE
 from hydraulic_interfaces.conversions import CommandEncoder, MessageError, sample_from_messages
-from hydraulic_interfaces.nodes.parameters import ParameterTable
-from hydraulic_interfaces.nodes.serving import ServedNode, serve
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.nodes.serving import ServedNode, serve
 from hydraulic_sysid.excitation import NOT_STARTED, ExcitationError, Phase, Plan, Session, load_plan
 from hydraulic_sysid.nodes._bandwidth_probe import BandwidthProbe
 from hydraulic_sysid.nodes._excitation_health import health

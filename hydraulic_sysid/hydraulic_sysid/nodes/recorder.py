@@ -23,11 +23,11 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from hydraulic_interfaces.contract import NAMESPACE, RECORDER_NODE
-from hydraulic_interfaces.nodes import command_line
-from hydraulic_interfaces.nodes.exit_guard import exit_guard
-from hydraulic_interfaces.nodes.parameters import ParameterTable
-from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes import command_line
+from hydraulic_node_utils.nodes.exit_guard import exit_guard
+from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_sysid.data.bag import Recording, StopRule
 from hydraulic_sysid.nodes._recorder_health import RecorderHealth
 from hydraulic_sysid.nodes._recorder_intake import Intake

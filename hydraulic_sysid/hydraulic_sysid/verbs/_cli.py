@@ -20,14 +20,14 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.errors import HydraulicSimError
-from hydraulic_sysid.errors import HydraulicSysidError
 
 PROGRAM = "hydraulic_sysid"
 OK, NEGATIVE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
-class UsageError(HydraulicSysidError):
+class UsageError(HydraulicError):
     """The command line asks for something that cannot be done; the message says what and what can."""
 
 
@@ -88,9 +88,9 @@ def run(
 ) -> int:
     """Parse ``argv``, call ``action`` and return the exit code; None from it counts as 0.
 
-    `HydraulicSysidError`, `HydraulicSimError`, `OSError` and ``errors`` are the user's: printed, exit code 2.
+    `HydraulicError`, `HydraulicSimError`, `OSError` and ``errors`` are the user's: printed, exit code 2.
     """
-    bad_input: tuple[type[Exception], ...] = (HydraulicSysidError, HydraulicSimError, OSError, *errors)
+    bad_input: tuple[type[Exception], ...] = (HydraulicError, HydraulicSimError, OSError, *errors)
     try:
         options = parser.parse_args(argv)
     except SystemExit as stop:  # argparse has printed the help or what is wrong

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_interfaces.errors import HydraulicError
 
 
-class GreyBoxError(HydraulicSysidError, ValueError):
+class GreyBoxError(HydraulicError, ValueError):
     """Records, or the way they are held out, do not allow a black box on top of the white one."""

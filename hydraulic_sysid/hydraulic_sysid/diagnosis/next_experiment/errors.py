@@ -1,7 +1,7 @@
 """What can be wrong with a question for the next experiment."""
 
-from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_interfaces.errors import HydraulicError
 
 
-class NextExperimentError(HydraulicSysidError):
+class NextExperimentError(HydraulicError):
     """The rivals cannot be compared, or no movement keeps the limits; the message says why."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_interfaces.errors import HydraulicError
 
 
-class FrequencyResponseError(HydraulicSysidError, ValueError):
+class FrequencyResponseError(HydraulicError, ValueError):
     """The record cannot give the frequency response that was asked for; the message says what it lacks."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hydraulic_sysid.errors import HydraulicSysidError
+from hydraulic_interfaces.errors import HydraulicError
 
 
-class IdentificationError(HydraulicSysidError, ValueError):
+class IdentificationError(HydraulicError, ValueError):
     """The data cannot give the model that was asked for (too short, input not moving, wrong order)."""

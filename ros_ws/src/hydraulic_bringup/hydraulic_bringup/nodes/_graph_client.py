@@ -16,8 +16,8 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service, topic
-from hydraulic_interfaces.nodes.exit_guard import exit_guard
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes.exit_guard import exit_guard
 
 _POLL_S = 0.1
 

@@ -21,11 +21,11 @@ from rich.table import Table
 
 from hydraulic_bringup.demo import offline, online
 from hydraulic_bringup.demo.errors import DemoError
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.errors import HydraulicSimError
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.display import number, quantity
 from hydraulic_sysid.data.records import read_all
-from hydraulic_sysid.errors import HydraulicSysidError
 
 DATA_SHEET = "moog_mcr_m_1002_bench"
 RUNS = Path("runs")
@@ -91,7 +91,7 @@ def _guarded(options: argparse.Namespace, console: Console) -> int:
         if error.remedy:
             print(error.remedy, file=sys.stderr)
         return 1
-    except (HydraulicSimError, HydraulicSysidError, OSError) as error:
+    except (HydraulicSimError, HydraulicError, OSError) as error:
         print(f"demo: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

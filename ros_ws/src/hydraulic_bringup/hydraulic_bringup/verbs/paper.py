@@ -25,12 +25,12 @@ from hydraulic_bringup.paper.document import document
 from hydraulic_bringup.paper.printing import show
 from hydraulic_bringup.verbs.demo import ProgressSteps, new_folder
 from hydraulic_control.errors import HydraulicControlError
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.errors import HydraulicSimError
 from hydraulic_sim.model_file import load_model, presets
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.errors import HydraulicSysidError
 from hydraulic_sysid.excitation import Plan, load_plan
 from hydraulic_sysid.linear.bandwidth import Bandwidth, BandwidthError, from_model, from_record
 from hydraulic_sysid.linear.models import IdentificationError
@@ -64,7 +64,7 @@ def _guarded(options: argparse.Namespace, console: Console) -> int:
     except IdentificationError as error:
         print(f"\npaper failed at step 'identify': {error}", file=sys.stderr)
         return 1
-    except (HydraulicSimError, HydraulicSysidError, HydraulicControlError, OSError) as error:
+    except (HydraulicSimError, HydraulicError, HydraulicControlError, OSError) as error:
         print(f"paper: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -22,7 +22,7 @@ from hydraulic_can_driver.errors import CanDriverError
 from hydraulic_can_driver.virtual import VirtualBench
 from hydraulic_can_driver.virtual.faults import FAULTS, Fault
 from hydraulic_can_driver.virtual.wiring import Event
-from hydraulic_interfaces.pacing import request_realtime
+from hydraulic_plant_node.pacing import request_realtime
 from hydraulic_sim.errors import HydraulicSimError
 from hydraulic_sim.model_file import load_model
 

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hydraulic_interfaces.nodes.running import run_plant
-from hydraulic_interfaces.parameter_spec import ParameterSpec
-from hydraulic_interfaces.plant_backend import BackendError, PlantBackend
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_plant_node.nodes.running import run_plant
+from hydraulic_plant_node.plant_backend import BackendError, PlantBackend
 
 STROKE = 0.2
 REFUSED_GAIN = 0.75  # within the declared range, but not for this plant

@@ -7,10 +7,10 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from hydraulic_interfaces.command_gate import CommandGate, Verdict
 from hydraulic_interfaces.conversions import to_time
-from hydraulic_interfaces.plant_backend import PlantBackend
-from hydraulic_interfaces.plant_loop import PlantLoop
+from hydraulic_plant_node.command_gate import CommandGate, Verdict
+from hydraulic_plant_node.plant_backend import PlantBackend
+from hydraulic_plant_node.plant_loop import PlantLoop
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 # A wall clock set by more than this makes commands look stale and records inconsistent.

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-GUARDED = "from hydraulic_interfaces.nodes.exit_guard import exit_guard\nwith exit_guard({code}, 0.2):"
+GUARDED = "from hydraulic_node_utils.nodes.exit_guard import exit_guard\nwith exit_guard({code}, 0.2):"
 # PyDLL keeps the interpreter's lock during the call, as rclpy does while it destroys a node.
 HANG = "    import ctypes, threading; threading.Thread(target=lambda: None).start(); ctypes.PyDLL(None).sem_wait(s)"
 SEMAPHORE = "import ctypes; s = ctypes.create_string_buffer(64); ctypes.CDLL(None).sem_init(s, 0, 0)"

@@ -15,17 +15,17 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
-from hydraulic_interfaces.command_gate import CommandGate
 from hydraulic_interfaces.contract import NAMESPACE, PLANT_NODE, RATE_HZ, WATCHDOG_S
 from hydraulic_interfaces.conversions import interface_class
-from hydraulic_interfaces.nodes.guarded_lifecycle import guard_transitions
-from hydraulic_interfaces.nodes.parameters import ParameterTable
-from hydraulic_interfaces.nodes.plant_health import PlantHealth
-from hydraulic_interfaces.nodes.plant_ports import PlantPorts
-from hydraulic_interfaces.parameter_spec import ParameterSpec
-from hydraulic_interfaces.plant_backend import PlantBackend
-from hydraulic_interfaces.plant_loop import LoopTiming, PlantLoop
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes.guarded_lifecycle import guard_transitions
+from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.nodes.plant_health import PlantHealth
+from hydraulic_plant_node.nodes.plant_ports import PlantPorts
+from hydraulic_plant_node.plant_backend import PlantBackend
+from hydraulic_plant_node.plant_loop import LoopTiming, PlantLoop
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS,

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hydraulic_interfaces.command_gate import CommandGate, Verdict
 from hydraulic_interfaces.samples import Command
+from hydraulic_plant_node.command_gate import CommandGate, Verdict
 
 MS = 1_000_000
 WATCHDOG_MS = 50

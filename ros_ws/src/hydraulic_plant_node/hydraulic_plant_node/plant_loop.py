@@ -13,17 +13,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from hydraulic_interfaces.command_gate import CommandGate
-from hydraulic_interfaces.pacing import (
+from hydraulic_interfaces.samples import PlantSample
+from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.pacing import (
     Pacer,
     Wakefulness,
     release_realtime_for_all,
     request_realtime,
     request_realtime_for_all,
 )
-from hydraulic_interfaces.plant_backend import PlantBackend
-from hydraulic_interfaces.rate_monitor import RateMonitor
-from hydraulic_interfaces.samples import PlantSample
+from hydraulic_plant_node.plant_backend import PlantBackend
+from hydraulic_plant_node.rate_monitor import RateMonitor
 
 # The interpreter hands over between threads at this interval; the usual 5 ms is five cycles.
 _SWITCH_INTERVAL_S = 5e-5

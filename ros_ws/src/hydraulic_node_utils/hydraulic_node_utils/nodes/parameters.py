@@ -9,7 +9,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 # Stands for "unbounded" in a descriptor, which knows no infinity.
 _UNBOUNDED = 1e308

@@ -13,9 +13,9 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from hydraulic_interfaces.nodes import command_line
-from hydraulic_interfaces.nodes.exit_guard import exit_guard
-from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_node_utils.nodes import command_line
+from hydraulic_node_utils.nodes.exit_guard import exit_guard
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 WATCH_PERIOD_S = 0.05
 

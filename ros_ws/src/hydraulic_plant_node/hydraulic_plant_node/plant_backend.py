@@ -6,8 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hydraulic_interfaces.parameter_spec import ParameterSpec
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 
 class BackendError(RuntimeError):

@@ -11,7 +11,6 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, String
 
-from hydraulic_interfaces.command_gate import CommandGate
 from hydraulic_interfaces.contract import find_topic
 from hydraulic_interfaces.conversions import (
     ClockEncoder,
@@ -21,9 +20,10 @@ from hydraulic_interfaces.conversions import (
     command_from_message,
     interface_class,
 )
-from hydraulic_interfaces.nodes.mailbox import Mailbox
 from hydraulic_interfaces.qos import STREAM_DEPTH, STREAM_HISTORY, profile
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.nodes.mailbox import Mailbox
+from hydraulic_plant_node.command_gate import CommandGate
 
 
 class PlantPorts:

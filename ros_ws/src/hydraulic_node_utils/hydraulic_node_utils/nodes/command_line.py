@@ -10,9 +10,9 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from hydraulic_interfaces.nodes.discovery import stay_local
-from hydraulic_interfaces.nodes.log_callers import know_log_callers
-from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_node_utils.nodes.discovery import stay_local
+from hydraulic_node_utils.nodes.log_callers import know_log_callers
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 
 def parser(description: str, parameters: Sequence[ParameterSpec]) -> argparse.ArgumentParser:

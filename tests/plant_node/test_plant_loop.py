@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from hydraulic_interfaces.command_gate import CommandGate
-from hydraulic_interfaces.parameter_spec import ParameterSpec
-from hydraulic_interfaces.plant_backend import PlantBackend
-from hydraulic_interfaces.plant_loop import LoopTiming, PlantLoop
 from hydraulic_interfaces.samples import Command, PlantSample
+from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.plant_backend import PlantBackend
+from hydraulic_plant_node.plant_loop import LoopTiming, PlantLoop
 
 PERIOD = 1_000_000
 

@@ -13,10 +13,10 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from hydraulic_interfaces.nodes import command_line
-from hydraulic_interfaces.nodes.exit_guard import exit_guard
-from hydraulic_interfaces.nodes.plant_node import PlantNode, parameters_of
-from hydraulic_interfaces.plant_backend import PlantBackend
+from hydraulic_node_utils.nodes import command_line
+from hydraulic_node_utils.nodes.exit_guard import exit_guard
+from hydraulic_plant_node.nodes.plant_node import PlantNode, parameters_of
+from hydraulic_plant_node.plant_backend import PlantBackend
 
 _SPIN_S = 1.0
 _PATIENCE_S = 5.0

@@ -10,8 +10,8 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy")
 
-from hydraulic_interfaces.nodes import command_line  # noqa: E402
-from hydraulic_interfaces.parameter_spec import ParameterSpec  # noqa: E402
+from hydraulic_node_utils.nodes import command_line  # noqa: E402
+from hydraulic_node_utils.parameter_spec import ParameterSpec  # noqa: E402
 
 WORKSPACE = Path(__file__).resolve().parents[2] / "ros_ws" / "src"
 PARAMETERS = (ParameterSpec("gain", 2.5, "how much", "V/m"),)
@@ -56,7 +56,7 @@ def test_every_executable_node_starts_this_way() -> None:
         if "rclpy.init(" in file.read_text(encoding="utf-8")
     }
     assert callers == {
-        "hydraulic_interfaces/hydraulic_interfaces/nodes/command_line.py",
+        "hydraulic_node_utils/hydraulic_node_utils/nodes/command_line.py",
         "hydraulic_bringup/hydraulic_bringup/nodes/_graph_client.py",
         "hydraulic_bringup/hydraulic_bringup/entry/virtualenv.py",  # sees whether rclpy starts
     }

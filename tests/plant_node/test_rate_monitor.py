@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hydraulic_interfaces.rate_monitor import RateMonitor
+from hydraulic_plant_node.rate_monitor import RateMonitor
 
 PERIOD = 1_000_000
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hydraulic_interfaces.parameter_spec import ParameterSpec
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 RATE = ParameterSpec("rate", 1000.0, "sampling rate", "Hz", 1.0, 5000.0)
 

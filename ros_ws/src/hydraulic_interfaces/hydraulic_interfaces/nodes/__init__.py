@@ -1,1 +1,0 @@
-"""Node side of the contract: base class of plant nodes, parameters, mailboxes. No executables."""
