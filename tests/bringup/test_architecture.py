@@ -122,7 +122,8 @@ def test_imports_between_wings_run_down() -> None:
 
 def test_bags_know_nothing_of_records() -> None:
     for file in sorted((FOLDERS["hydraulic_sysid"] / "data" / "bag").glob("*.py")):
-        assert not re.search(r"^\s*from (hydraulic_sysid\.data|\.)\.records", file.read_text("utf-8"), re.MULTILINE), file
+        text = file.read_text("utf-8")
+        assert not re.search(r"^\s*from (hydraulic_sysid\.data|\.)\.records", text, re.MULTILINE), file
 
 
 @pytest.mark.parametrize(
