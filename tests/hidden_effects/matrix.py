@@ -81,9 +81,9 @@ def held_out_ratio(bench: benches.Bench, model: Any, after: Any, records: Any, f
     truth = bench.truth()
     for name in {*bench.effects, "presliding"}:
         true = true.with_effect(name, truth.get(name))
-    best = calibrate(true, records, fresh).result["held_out"]["after"]
+    best = calibrate(true, records, fresh).result["test"]["after"]
     reached = evaluate(after, fresh).rms
-    before = calibrate(model, records, fresh).result["held_out"]["after"]
+    before = calibrate(model, records, fresh).result["test"]["after"]
     return {
         "held_out_before": before,
         "held_out_after": reached,

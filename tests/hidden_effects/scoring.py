@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-MISSING, TIE, COMPLETE, OUTSIDE = "missing", "cannot be told apart", "complete", "outside the library"
+MISSING, TIE, COMPLETE, OUTSIDE = "missing", "indistinguishable", "complete", "outside the library"
 NEAR = 0.10  # of the true value, from the parameter's null
 AS_GOOD = 1.2  # held-out error over that of the true structure
 NULLS = {"sensor_scale.scale": 1.0}
@@ -18,7 +18,7 @@ def named(result: dict[str, Any]) -> list[str]:
     """Effects that the diagnosis says are there, the strongest first; none unless it says that some are missing."""
     if result["verdict"]["kind"] not in (MISSING, TIE):
         return []
-    return [e["name"] for e in _ranked(result) if e["found"]]
+    return [e["name"] for e in _ranked(result) if e["added"]]
 
 
 def _ranked(result: dict[str, Any]) -> list[dict[str, Any]]:

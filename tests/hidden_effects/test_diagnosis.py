@@ -48,7 +48,7 @@ def test_the_step_of_a_coarse_sensor_is_read_off_its_readings(tmp_path):
     assert result["verdict"]["effects"] == ["sensor_quantisation"], result["verdict"]
     (step,) = result["effects"][0]["parameters"]
     assert step["value"] == pytest.approx(bench.truth()["sensor_quantisation"]["step"], rel=1e-4)
-    for shown in result["curves"]:  # and the curves of the report are rounded, too
+    for shown in result["worst_segments"]:  # and the curves of the report are rounded, too
         position = shown["channels"]["position"]
         codes = position["after"] / step["value"]
         assert np.abs(codes - np.round(codes)).max() < 0.02

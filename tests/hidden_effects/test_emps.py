@@ -48,6 +48,6 @@ def test_a_motor_axis_is_diagnosed_from_drive_and_position(diagnosed):
 @pytest.mark.skipif(not MEASURED, reason="EMPS_DATA names no DATA_EMPS.mat")
 def test_the_measured_axis_misses_an_effect_of_its_force_balance(tmp_path):
     result = diagnose(model_in(tmp_path), read_all([MEASURED], "emps")).result
-    assert result["verdict"]["kind"] in ("missing", "cannot be told apart"), result["verdict"]
+    assert result["verdict"]["kind"] in ("missing", "indistinguishable"), result["verdict"]
     assert result["verdict"]["subsystem"] == "force", result["verdict"]
-    assert result["effects"][0]["error_after"] < result["effects"][0]["error_before"]
+    assert result["effects"][0]["residual_after"] < result["effects"][0]["residual_before"]

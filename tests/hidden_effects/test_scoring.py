@@ -19,11 +19,11 @@ def effect(name: str, rank: int = 1, **parameters: tuple[float, float]) -> dict[
         {"key": f"{name}.{k}", "value": v, "standard_error": e, "interval": [v - 1.96 * e, v + 1.96 * e], "unit": "1"}
         for k, (v, e) in parameters.items()
     ]
-    return {"name": name, "rank": rank, "found": True, "parameters": rows}
+    return {"name": name, "rank": rank, "added": True, "parameters": rows}
 
 
 def said(kind: str, *effects: dict[str, Any], others: tuple[str, ...] = (), subsystem: str | None = None):
-    tried = [{"name": n, "rank": 10 + i, "found": False, "parameters": []} for i, n in enumerate(others)]
+    tried = [{"name": n, "rank": 10 + i, "added": False, "parameters": []} for i, n in enumerate(others)]
     return {"verdict": {"kind": kind, "text": "", "subsystem": subsystem}, "effects": [*effects, *tried]}
 
 

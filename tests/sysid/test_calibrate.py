@@ -129,17 +129,17 @@ def test_intervals_hold_the_truth(axis: list[dict[str, Array]], model: Model) ->
 
 def test_residual_falls_to_the_noise_on_held_out_records_too(records: list[Record], model: Model) -> None:
     done = calibrate(model, records[:2], records[2:])
-    for part in ("fitted", "held_out"):
+    for part in ("fit", "test"):
         assert done.result[part]["before"] > 3.0
         assert done.result[part]["after"] == pytest.approx(1.0, abs=0.05)
         for row in done.result[part]["records"]:
             assert row["after"] == pytest.approx(1.0, abs=0.1)
-            assert row["noise"] == pytest.approx(NOISE[row["channel"]], rel=0.15)
+            assert row["noise_std"] == pytest.approx(NOISE[row["channel"]], rel=0.15)
     assert done.result["verdict"]["level"] == "explained"
-    assert done.result["not_told"] == []
+    assert done.result["not_identifiable"] == []
     line = done.model.history[-1]
     assert line["records"] == ["record_0", "record_1"]
-    assert line["held_out"] == ["record_2"]
+    assert line["test_records"] == ["record_2"]
     assert done.model.entry("moving_mass").standard_error == named(done.result, "moving_mass")["standard_error"]
 
 
@@ -151,8 +151,8 @@ def test_held_out_records_do_not_touch_the_fit(
     for again in fits[1:]:
         assert again["parameters"] == fits[0]["parameters"]
         assert again["correlation"] == fits[0]["correlation"]
-        assert again["fitted"] == fits[0]["fitted"]
-    assert fits[1]["held_out"]["after"] < 1.1 < fits[2]["held_out"]["after"]
+        assert again["fit"] == fits[0]["fit"]
+    assert fits[1]["test"]["after"] < 1.1 < fits[2]["test"]["after"]
 
 
 def test_same_data_give_the_same_result_whatever_the_workers(
@@ -188,9 +188,9 @@ def bare(record: Record) -> Record:
 
 def test_without_pressures_the_rest_is_still_fitted_and_less_is_told(records: list[Record], model: Model) -> None:
     full, less = (calibrate(model, r[:2]).result for r in (records, [bare(r) for r in records]))
-    assert {r["channel"] for r in less["fitted"]["records"]} == {"position"}
+    assert {r["channel"] for r in less["fit"]["records"]} == {"position"}
     assert less["converged"]
-    assert less["fitted"]["after"] < 1.1
+    assert less["fit"]["after"] < 1.1
     for p in less["parameters"]:
         assert p["value"] == pytest.approx(TRUTH[p["key"]], rel=0.3)
     for key in ("moving_mass", "viscous_friction.coefficient"):
@@ -203,9 +203,9 @@ def test_without_pressures_the_rest_is_still_fitted_and_less_is_told(records: li
 
 def test_small_motion_without_pressures_does_not_tell_mass_from_oil(model: Model) -> None:
     result = calibrate(model, [bare(noisy("small", clean(1, 4.0, 0.1), 3))]).result
-    assert any({"moving_mass", "bulk_modulus"} <= set(d["weights"]) for d in result["not_told"])
-    assert not named(result, "viscous_friction.coefficient")["told"]
-    assert not named(result, "internal_leakage.coefficient")["told"]
+    assert any({"moving_mass", "bulk_modulus"} <= set(d["weights"]) for d in result["not_identifiable"])
+    assert not named(result, "viscous_friction.coefficient")["identifiable"]
+    assert not named(result, "internal_leakage.coefficient")["identifiable"]
 
 
 def test_what_standing_still_does_not_tell_is_named(model: Model) -> None:
@@ -214,9 +214,9 @@ def test_what_standing_still_does_not_tell_is_named(model: Model) -> None:
              "pressure_b": np.full(count, 7.15e6)}  # fmt: skip
     done = calibrate(model, [noisy("still", still, 1)], (), None, ["viscous_friction.coefficient"])
     parameter = done.result["parameters"][0]
-    assert not parameter["told"]
-    assert done.result["not_told"][0]["weights"].keys() == {"viscous_friction.coefficient"}
-    assert "do not tell viscous_friction.coefficient" in done.result["verdict"]["text"]
+    assert not parameter["identifiable"]
+    assert done.result["not_identifiable"][0]["weights"].keys() == {"viscous_friction.coefficient"}
+    assert "cannot identify viscous_friction.coefficient" in done.result["verdict"]["text"]
     assert "viscous_friction.coefficient" in render([plain(done.result)])
 
 
@@ -292,8 +292,8 @@ def test_mechanical_axis_from_force_to_position() -> None:
     for key, value in truth.items():
         assert done.model.value(key) == pytest.approx(value, rel=0.03)
     # The simulator's dry friction turns within micrometres and milliseconds, that of `dry_axis` at once.
-    assert done.result["held_out"]["after"] < 1.4
-    assert done.result["held_out"]["before"] > 5.0
+    assert done.result["test"]["after"] < 1.4
+    assert done.result["test"]["before"] > 5.0
 
 
 def test_unusable_input_is_named(records: list[Record], model: Model) -> None:
@@ -318,7 +318,7 @@ def test_unusable_input_is_named(records: list[Record], model: Model) -> None:
         with pytest.raises((CalibrationError, ModelError), match=words):
             call()
     first, last = records[0].split(0.5)
-    assert calibrate(model, [first], [last], keys=["valve_flow"]).result["held_out"]["after"] > 0.9
+    assert calibrate(model, [first], [last], keys=["valve_flow"]).result["test"]["after"] > 0.9
 
 
 def save_csv(path: Path, record: Record) -> str:
@@ -344,7 +344,7 @@ def test_verb_writes_document_page_and_model(
     result = json.loads((out / "calibrate.json").read_text(encoding="utf-8"))
     printed = " ".join(capsys.readouterr().out.split())
     assert result["verdict"]["text"] in printed
-    assert "held out" in printed
+    assert " test " in printed
     page = (out / "report.html").read_text(encoding="utf-8")
     assert result["verdict"]["text"] in page
     assert all(p["key"] in page for p in result["parameters"])
@@ -353,7 +353,7 @@ def test_verb_writes_document_page_and_model(
         assert made.value(p["key"]) == pytest.approx(p["value"], rel=1e-9)
         assert made.entry(p["key"]).standard_error == pytest.approx(p["standard_error"], rel=1e-9)
         assert made.entry(p["key"]).source == "calibrated"
-    assert made.history[-1]["held_out"] == ["record_2"]
+    assert made.history[-1]["test_records"] == ["record_2"]
     before = (out / "model.yaml").read_bytes()
     assert verb.main(call) == 2
     assert "never overwritten" in capsys.readouterr().err
@@ -368,7 +368,7 @@ def test_verb_prints_json_and_takes_chosen_parameters(
     result = json.loads(capsys.readouterr().out)
     assert [p["key"] for p in result["parameters"]] == ["valve_flow"]
     assert result["settings"]["robust"] is True
-    assert result["held_out"] is None
+    assert result["test"] is None
     assert result["records"][0]["duration"] == pytest.approx(2.0)
 
 
@@ -401,7 +401,7 @@ def test_figures_show_what_the_document_holds(records: list[Record], model: Mode
     assert len(bars.layout.shapes) == 6
     assert all(s.y0 == s.y1 == 1 for s in bars.layout.shapes)
     shown = [float(v) for trace in bars.data if trace.name == "after" for v in trace.y]
-    stored = {r["after"] for part in ("fitted", "held_out") for r in result[part]["records"]}
+    stored = {r["after"] for part in ("fit", "test") for r in result[part]["records"]}
     assert sorted(shown) == pytest.approx(sorted(stored), rel=1e-5)
     assert np.allclose(calibrate_figures.correlation(result).data[0].z, result["correlation"]["matrix"])
     page = render([{**result, "model": {"name": "<b>x", "path": None}}])

@@ -122,13 +122,13 @@ def test_the_plan_is_saved_with_its_drive_and_can_be_moved(proposal: Proposal, t
 def test_the_document_and_its_page(proposal: Proposal) -> None:
     document = plain(proposal.document)
     json.dumps(document, allow_nan=False)
-    assert {r["name"] for r in document["rivals"]} == {TRUTH, OTHER}
+    assert {r["name"] for r in document["competing_models"]} == {TRUTH, OTHER}
     assert {(p["true"], p["refitted"]) for p in document["pairs"]} == {(TRUTH, OTHER), (OTHER, TRUTH)}
     for pair in document["pairs"]:
         assert pair["separation"] == pytest.approx(0.5 * math.sqrt(pair["chi_square"]))
         assert pair["seconds_needed"] == pytest.approx(SECONDS * 25.0 / pair["separation"] ** 2)
-        assert sum(pair["shares"].values()) == pytest.approx(1.0)
-    chosen, *others = document["alternatives"]
+        assert sum(pair["channel_shares"].values()) == pytest.approx(1.0)
+    chosen, *others = document["compared_experiments"]
     assert chosen["kind"] == "chosen"
     assert chosen["separation"] >= 0.95 * max(o["separation"] for o in others)
     page = render([document])
@@ -241,21 +241,21 @@ def test_the_verb_on_a_diagnosis(
     folder, out = tmp_path / "diagnosed", tmp_path / "next"
     folder.mkdir()
     document = {
-        "schema": "hydraulic_sysid.diagnose/1",
+        "schema": "hydraulic_sysid.diagnose/2",
         "verdict": {"effects": [TRUTH, OTHER], "text": "one of two"},
-        "settings": {"piece": 0.5},
-        "noise_floor": {"position": {"first": 1.9e-5, "second": 2.1e-5}},
+        "settings": {"segment_length": 0.5},
+        "noise_std": {"position": {"first": 1.9e-5, "second": 2.1e-5}},
     }
     (folder / "diagnose.json").write_text(json.dumps(document))
-    save_model(old[0][OTHER], folder / f"rival_{OTHER}.yaml")
+    save_model(old[0][OTHER], folder / f"competing_{OTHER}.yaml")
     arguments = ["--diagnosis", str(folder), "--out", str(out), "--seconds", "3", "--json"]
     assert verb.main(arguments) == 2
-    assert "models of 1 rivals" in capsys.readouterr().err
+    assert "holds 1 competing models" in capsys.readouterr().err
     save_model(old[0][TRUTH], folder / "model.yaml")
     assert verb.main(arguments) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed["noise"] == {"position": pytest.approx(2e-5)}
-    assert {r["name"] for r in printed["rivals"]} == {TRUTH, OTHER}
+    assert printed["noise_std"] == {"position": pytest.approx(2e-5)}
+    assert {r["name"] for r in printed["competing_models"]} == {TRUTH, OTHER}
     assert load_plan(out / "next_experiment.yaml").prediction is not None
     assert (out / "report.html").is_file()
     assert verb.main(arguments) == 2

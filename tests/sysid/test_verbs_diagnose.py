@@ -24,25 +24,25 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_hidden_dead_band_is_found_and_its_width_too(run: Path) -> None:
     found = json.loads((run / "diagnose.json").read_text())
-    assert found["schema"] == "hydraulic_sysid.diagnose/1"
+    assert found["schema"] == "hydraulic_sysid.diagnose/2"
     assert found["verdict"]["kind"] == "missing"
     assert found["verdict"]["effects"] == ["valve_deadband"]
     assert found["verdict"]["subsystem"] == "valve"
     first = found["effects"][0]
-    assert (first["name"], first["rank"], first["found"]) == ("valve_deadband", 1, True)
-    assert first["error_before"] > 10.0 > 1.3 > first["error_after"]
+    assert (first["name"], first["rank"], first["added"]) == ("valve_deadband", 1, True)
+    assert first["residual_before"] > 10.0 > 1.3 > first["residual_after"]
     width = first["parameters"][0]
     assert width["value"] == pytest.approx(0.03, rel=0.02) and width["standard_error"] > 0.0
-    assert [s["name"] for s in found["steps"]] == ["valve_deadband"]
+    assert [s["name"] for s in found["residual"]["after_each_effect"]] == ["valve_deadband"]
     assert len(found["effects"]) == len({e["name"] for e in found["effects"]}) > 30
     assert {b["name"] for b in found["balances"]} >= {"force", "flow_a", "flow_b"}
-    assert set(found["noise_floor"]) == {"position", "pressure_a", "pressure_b"}
+    assert set(found["noise_std"]) == {"position", "pressure_a", "pressure_b"}
 
 
 def test_why_not_the_runner_up_is_said_with_its_figure(run: Path) -> None:
     found = json.loads((run / "diagnose.json").read_text())
-    second = found["alternatives"]["valve_deadband"][0]
-    assert second["told_apart"] and second["error_after"] > 5.0
+    second = found["competing_models"]["valve_deadband"][0]
+    assert second["distinguishable"] and second["residual_after"] > 5.0
     assert f"Why not {second['name']}" in found["verdict"]["text"]
 
 
@@ -73,8 +73,8 @@ def test_add_fits_an_effect_and_says_whether_the_data_bear_it_out(
     assert add_main(["valve_deadband", *command, "--out", str(tmp_path / "right")]) == 0
     done = json.loads(capsys.readouterr().out)
     assert done["verdict"]["kind"] == "confirmed"
-    assert [r["name"] for r in done["records"] if r["held_out"]]
-    assert done["error"]["after"]["held_out"] < 0.2 * done["error"]["before"]["held_out"]
+    assert [r["name"] for r in done["records"] if r["role"] == "validation"]
+    assert done["residual"]["after"]["validation"] < 0.2 * done["residual"]["before"]["validation"]
     assert "valve_deadband" in load_model(tmp_path / "right" / "model.yaml").effects
     assert add_main(["no_such_effect", *command, "--out", str(tmp_path / "none")]) == 2
     assert "no_such_effect" in capsys.readouterr().err

@@ -21,11 +21,11 @@ _DIVERGING = [[0.0, style.FREE_RUN], [0.5, "rgba(128,138,150,0.10)"], [1.0, styl
 
 
 def changes(result: Result) -> go.Figure | None:
-    """What became of each parameter, relative to its value before, with its 95 % interval; None if none is told.
+    """What became of each parameter, relative to its value before, with its 95 % interval; None if none is known.
 
     A parameter that was zero is given relative to its scale.
     """
-    told = [p for p in reversed(result["parameters"]) if p["standard_error"] is not None and p["told"]]
+    told = [p for p in reversed(result["parameters"]) if p["standard_error"] is not None and p["identifiable"]]
     if not told:
         return None
     size = np.array([_reference(p) for p in told])
@@ -52,8 +52,8 @@ def changes(result: Result) -> go.Figure | None:
 
 
 def residuals(result: Result) -> go.Figure:
-    """Residual over noise before and after: held-out records above those fitted, one column per channel."""
-    parts = [(k, t) for k, t in (("held_out", "Held out"), ("fitted", "Fitted")) if result[k] is not None]
+    """Residual over noise before and after: test records above those fitted, one column per channel."""
+    parts = [(k, t) for k, t in (("test", "Test"), ("fit", "Fit")) if result[k] is not None]
     channels = list(dict.fromkeys(r["channel"] for part, _ in parts for r in result[part]["records"]))
     titles = [f"{title} · {TITLES.get(channel, channel)}" for _, title in parts for channel in channels]
     panels = Panels(len(parts), len(channels), gap=(0.06, 0.2), titles=titles)

@@ -20,7 +20,7 @@ def html(result: Result, place: Figures) -> str:
         _heading(result)
         + _cards(result)
         + _parameters(result, place)
-        + _not_told(result)
+        + _not_identifiable(result)
         + _residuals(result, place)
         + _correlation(result, place)
         + _method(result)
@@ -29,11 +29,11 @@ def html(result: Result, place: Figures) -> str:
 
 def _heading(result: Result) -> str:
     kind = f"Calibration · {made_on(result)}"
-    fitted = [r["name"] for r in result["records"] if r["fitted"]]
-    held = [r["name"] for r in result["records"] if not r["fitted"]]
+    fitted = [r["name"] for r in result["records"] if r["role"] == "fit"]
+    held = [r["name"] for r in result["records"] if r["role"] == "test"]
     size = len(result["parameters"])
     what = f"{size} parameter{'s' if size != 1 else ''} fitted to {', '.join(fitted)}"
-    lead = f"{what}; held out: {', '.join(held) or 'none'}"
+    lead = f"{what}; test: {', '.join(held) or 'none'}"
     verdict = result["verdict"]
     return tag(
         "header",
@@ -45,20 +45,22 @@ def _heading(result: Result) -> str:
 def _cards(result: Result) -> str:
     cards = [
         (title, _fall(result[part]), "residual over noise; 1 is an exact model")
-        for part, title in (("held_out", "Held-out records"), ("fitted", "Records fitted"))
+        for part, title in (("test", "Test records"), ("fit", "Records fitted"))
         if result[part] is not None
     ]
-    told = [p for p in result["parameters"] if p["told"]]
+    identifiable = [p for p in result["parameters"] if p["identifiable"]]
     at_bound = [p for p in result["parameters"] if p["at_bound"]]
     cards.append(
         (
-            "Parameters told",
-            f"{len(told)}<small> of {len(result['parameters'])}</small>",
+            "Identifiable parameters",
+            f"{len(identifiable)}<small> of {len(result['parameters'])}</small>",
             f"{len(at_bound) or 'none'} at a bound",
         )
     )
     state = "converged" if result["converged"] else "not converged"
-    cards.append(("Condition number", _power(result["condition"]), f"{state} after {result['steps']} steps"))
+    cards.append(
+        ("Condition number", _power(result["condition_number"]), f"{state} after {result['iterations']} iterations")
+    )
     return tag(
         "div",
         "".join(
@@ -95,7 +97,7 @@ def _parameters(result: Result, place: Figures) -> str:
     ]
     head = ["Parameter", "Before", "After", "Standard error", "Bounds", "At bound", "Unit"]
     lead = (
-        "Standard errors take whole pieces of the records as independent, so that they hold for residuals that are "
+        "Standard errors take whole segments of the records as independent, so that they hold for residuals that are "
         "correlated in time. The figure gives changes relative to the value before, with 95 % intervals; an open "
         "diamond stands at a bound."
     )
@@ -106,23 +108,23 @@ def _parameters(result: Result, place: Figures) -> str:
 def _standard_error(parameter: dict[str, Any]) -> str:
     error = parameter["standard_error"]
     if error is None:
-        return "not told"
+        return "not identifiable"
     share = 100.0 * error / (abs(parameter["value"]) or parameter["scale"])
     return f"{error:.2g} ({number(share)} %)"
 
 
-def _not_told(result: Result) -> str:
-    vague = [p for p in result["parameters"] if not p["told"]]
-    items = [_vague(p) for p in vague] + [_direction(d) for d in result["not_told"]]
+def _not_identifiable(result: Result) -> str:
+    vague = [p for p in result["parameters"] if not p["identifiable"]]
+    items = [_vague(p) for p in vague] + [_direction(d) for d in result["not_identifiable"]]
     if not items:
-        content = tag("p", "Every parameter, and every combination of them, is told by these records.")
+        content = tag("p", "Every parameter, and every combination of them, is identifiable from these records.")
     else:
         content = tag("ul", "".join(tag("li", text(item), "above_floor") for item in items), "findings")
     lead = (
-        "A parameter is not told when its standard error exceeds half its size; a combination, when moving along it "
-        "changes the simulation by less than the noise shows. Fix one of its parameters, or excite it."
+        "A parameter is not identifiable when its standard error exceeds half its size; a combination, when moving "
+        "along it changes the simulation by less than the noise shows. Fix one of its parameters, or excite it."
     )
-    return section("What these data do not tell", lead, content)
+    return section("What these data cannot identify", lead, content)
 
 
 def _vague(parameter: dict[str, Any]) -> str:
@@ -141,13 +143,13 @@ def _direction(direction: dict[str, Any]) -> str:
 
 
 def _residuals(result: Result, place: Figures) -> str:
-    parts = (("held_out", "held out"), ("fitted", "fitted"))
+    parts = (("test", "test"), ("fit", "fit"))
     rows = [
         [
             text(r["record"]),
             word,
             text(first_upper(TITLES.get(r["channel"], r["channel"]))),
-            quantity(r["noise"], UNITS[r["channel"]]),
+            quantity(r["noise_std"], UNITS[r["channel"]]),
             f"{number(r['before'])}×",
             f"{number(r['after'])}×",
         ]
@@ -155,10 +157,10 @@ def _residuals(result: Result, place: Figures) -> str:
         for r in (result[part] or {"records": []})["records"]
     ]
     lead = (
-        "RMS of what remains, over the measurement noise of the channel, every piece's initial state fitted. At 1 "
-        "(dotted) the noise alone is left."
+        "RMS of what remains, over the measurement noise of the channel, the initial state of every segment fitted. "
+        "At 1 (dotted) the noise alone is left."
     )
-    head = ["Record", "Data", "Channel", "Noise floor", "Before", "After"]
+    head = ["Record", "Data", "Channel", "Noise (standard deviation)", "Before", "After"]
     options = [("Figure", place.place(figures.residuals(result))), ("Table", table(head, rows))]
     return section("Residual over noise", lead, choice("view", options))
 
@@ -167,7 +169,7 @@ def _correlation(result: Result, place: Figures) -> str:
     if len(result["parameters"]) < 2:
         return ""
     lead = (
-        "Correlation of the parameters' errors. Near ±1 the data tell a combination of the two and hardly each by "
+        "Correlation of the parameters' errors. Near ±1 the data identify a combination of the two and hardly each by "
         "itself."
     )
     return section("Which parameters stand in for each other", lead, place.place(figures.correlation(result)))
@@ -176,10 +178,10 @@ def _correlation(result: Result, place: Figures) -> str:
 def _method(result: Result) -> str:
     settings = result["settings"]
     facts = {
-        "Pieces": f"about {settings['piece']:g} s each, with an initial state of their own that is fitted along",
-        "Weights": "one over the noise floor of each record's channel"
+        "Segments": f"about {settings['segment_length']:g} s, each with its own initial state",
+        "Weights": "one over the noise standard deviation of each record's channel"
         + ("; residuals beyond three times the noise count less (soft L1)" if settings["robust"] else ""),
-        "Held-out records": "only their pieces' initial states are fitted, never a parameter",
+        "Test records": "only the initial states of their segments are fitted, never a parameter",
         "Model file": result["model"]["path"] or "–",
         "Records": ", ".join(r["source"] for r in result["records"]),
     }

@@ -23,9 +23,9 @@ _VARIABLE_UNITS = {
 
 
 def steps(result: Result) -> go.Figure:
-    """The waterfall: residual over noise, held out, before and after each effect."""
-    names = ["before", *(f"+ {s['name']}" for s in result["steps"])]
-    levels = [result["error"]["before"]["held_out"], *(s["held_out"] for s in result["steps"])]
+    """The waterfall: residual over noise on validation data, before and after each effect."""
+    names = ["before", *(f"+ {s['name']}" for s in result["residual"]["after_each_effect"])]
+    levels = [at["validation"] for at in (result["residual"]["before"], *result["residual"]["after_each_effect"])]
     panels = Panels(1)
     panels.line(
         0,
@@ -64,7 +64,7 @@ def steps(result: Result) -> go.Figure:
 
 
 def curves(curve: dict[str, Any]) -> go.Figure:
-    """One piece: drive, and per channel measured, before and after, with the residuals over noise below."""
+    """One segment: drive, and per channel measured, before and after, with the residuals over noise below."""
     channels = list(curve["channels"])
     panels = Panels(1 + 2 * len(channels), heights=[0.7, *([1.2, 0.8] * len(channels))], gap=(0, 0.03), one_time=True)
     time = style.values(curve["time"])
@@ -81,7 +81,7 @@ def curves(curve: dict[str, Any]) -> go.Figure:
         panels.y_axis(row, f"{TITLES.get(channel, channel)} [{unit}]")
         measured = np.asarray(data["measured"], dtype=float)
         for key, colour in (("before", BEFORE), ("after", AFTER)):
-            left = (measured - np.asarray(data[key], dtype=float)) / data["noise"]
+            left = (measured - np.asarray(data[key], dtype=float)) / data["noise_std"]
             panels.line(row + 1, time, style.values(left), key, line={"color": colour, "width": 1})
         panels.y_axis(row + 1, "× noise")
     panels.x_axis(0, "time [s]")
@@ -96,7 +96,7 @@ def shape(curve: dict[str, Any]) -> go.Figure:
     y_factor, y_unit = (
         (1.0, curve["unit"]) if curve["unit"] not in ("Pa", "m", "N", "1") else style.shown(curve["unit"])
     )
-    x = style.values(curve["center"], x_factor)
+    x = style.values(curve["knots"], x_factor)
     panels = Panels(1)
     panels.line(0, x, style.values(curve["high"], y_factor), line={"width": 0}, hoverinfo="skip")
     panels.line(
@@ -104,7 +104,7 @@ def shape(curve: dict[str, Any]) -> go.Figure:
         line={"width": 0}, hoverinfo="skip",
     )  # fmt: skip
     panels.line(
-        0, x, style.values(curve["height"], y_factor), curve["summary"], legend=True, mode="lines+markers",
+        0, x, style.values(curve["value"], y_factor), curve["summary"], legend=True, mode="lines+markers",
         line={"color": AFTER, "width": 2},
     )  # fmt: skip
     panels.x_axis(0, f"{curve['variable'].replace('_', ' ')} [{x_unit}]")

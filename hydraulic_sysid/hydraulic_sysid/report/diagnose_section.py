@@ -24,7 +24,7 @@ def html(result: Result, place: Figures) -> str:
         + _curves(result, place)
         + _shapes(result, place)
         + _ranking(result)
-        + _alternatives(result)
+        + _competing_models(result)
         + _balances(result, place)
         + _parameters(result)
         + _method(result)
@@ -32,11 +32,11 @@ def html(result: Result, place: Figures) -> str:
 
 
 def _heading(result: Result) -> str:
-    kind = "Diagnosis" if "alternatives" in result else "Effect added"
-    records = [r["name"] for r in result["records"] if not r["held_out"]]
-    held = [r["name"] for r in result["records"] if r["held_out"]]
-    lead = f"{len(records)} record{'s' if len(records) != 1 else ''}: {', '.join(records)}; held out: " + (
-        ", ".join(held) or f"every {_nth(result['settings']['held_out_every'])} stretch of each"
+    kind = "Diagnosis" if "competing_models" in result else "Effect added"
+    records = [r["name"] for r in result["records"] if r["role"] == "fit"]
+    held = [r["name"] for r in result["records"] if r["role"] == "validation"]
+    lead = f"{len(records)} record{'s' if len(records) != 1 else ''}: {', '.join(records)}; validation: " + (
+        ", ".join(held) or f"every {_nth(result['settings']['validation_every'])} block of each"
     )
     verdict = result["verdict"]
     return tag(
@@ -53,16 +53,16 @@ def _nth(number_of: int | None) -> str:
 
 
 def _cards(result: Result) -> str:
-    error, verdict = result["error"], result["verdict"]
+    residual, verdict = result["residual"], result["verdict"]
     cards = [
         ("Verdict", text(verdict["kind"]), text(", ".join(verdict["effects"]) or "no effect was added")),
         (
-            "Held-out data",
-            f"<small>{number(error['before']['held_out'])} → </small>{number(error['after']['held_out'])}"
+            "Validation data",
+            f"<small>{number(residual['before']['validation'])} → </small>{number(residual['after']['validation'])}"
             "<small> × noise</small>",
             "residual over noise; 1 is an exact model",
         ),
-        ("Left over", percent(result["left_over"]), "of what the noise did not explain before"),
+        ("Unexplained", percent(result["unexplained_share"]), "of what the noise did not explain before"),
     ]
     if verdict["subsystem"]:
         cards.append(("Where", text(verdict["subsystem"]), "the part of the plant that is concerned"))
@@ -77,7 +77,7 @@ def _cards(result: Result) -> str:
 
 
 def _steps(result: Result, place: Figures) -> str:
-    if not result["steps"]:
+    if not result["residual"]["after_each_effect"]:
         return ""
     lead = (
         "Residual over noise on data that no fit has seen, before anything is added and after each effect, all free "
@@ -87,36 +87,37 @@ def _steps(result: Result, place: Figures) -> str:
 
 
 def _curves(result: Result, place: Figures) -> str:
-    if not result["curves"]:
+    if not result["worst_segments"]:
         return ""
     options = [
-        (c["record"] + (" (held out)" if c["held_out"] else ""), place.place(figures.curves(c)))
-        for c in result["curves"]
+        (c["record"] + (" (validation)" if c["role"] == "validation" else ""), place.place(figures.curves(c)))
+        for c in result["worst_segments"]
     ]
     lead = (
-        "The stretch of each record on which the model was worst before, as measured and as the model has it before "
+        "The segment of each record on which the model was worst before, as measured and as the model has it before "
         "and after; below each, measured − model over the noise."
     )
     return section("Before and after", lead, choice("record", options))
 
 
 def _shapes(result: Result, place: Figures) -> str:
-    shapes = result.get("shapes") or []
+    shapes = result.get("nonparametric_curves") or []
     if not shapes:
         return ""
     options = [
-        (f"{first_upper(_words(s['variable']))}: {percent(s['share'])}", place.place(figures.shape(s)))
+        (f"{first_upper(_words(s['variable']))}: {percent(s['explained_share'])}", place.place(figures.shape(s)))
         for s in shapes[:4]
     ]
     rows = [
-        [text(s["summary"]), text(_words(s["variable"])), text(s["subsystem"]), percent(s["share"])] for s in shapes
+        [text(s["summary"]), text(_words(s["variable"])), text(s["subsystem"]), percent(s["explained_share"])]
+        for s in shapes
     ]
     lead = (
         "What the plant would have to be given, at which place and over which variable, to explain what no effect of "
         "the library does: linear splines fitted to the residual with their 95 % band. The share is that of the "
         "residual beyond the noise."
     )
-    nearest = result.get("nearest") or []
+    nearest = result.get("nearest_effects") or []
     note = tag("p", f"Nearest names of the library: {text(', '.join(nearest))}.") if nearest else ""
     every = more("All places and variables", table(["What", "Over", "Acts on", "Explains"], rows))
     return section("The shape of what is left", lead, choice("shape", options) + note + every)
@@ -131,20 +132,20 @@ def _ranking(result: Result) -> str:
     lead = (
         "Every effect of the library that is off: what was found first (in order), then what was refitted, then what "
         "the screen found not worth a refit (predicted error in brackets). "
-        "Errors are residuals over noise on held-out data."
+        "Errors are residuals over noise on validation data."
     )
     return section("All effects", lead, content)
 
 
 def _row(effect: dict[str, Any]) -> list[str]:
     name = text(effect["name"])
-    after = number(effect["error_after"])
+    after = number(effect["residual_after"])
     values = ", ".join(_value(p) for p in effect["parameters"])
     return [
         str(effect["rank"]),
-        tag("strong", name) if effect["found"] else name,
+        tag("strong", name) if effect["added"] else name,
         text(effect["subsystem"]),
-        f"{number(effect['error_before'])}×",
+        f"{number(effect['residual_before'])}×",
         f"{after}×" if effect["refitted"] else f"({after}×)",
         text(values),
     ]
@@ -157,15 +158,15 @@ def _value(p: dict[str, Any]) -> str:
     return f"{p['key'].rpartition('.')[2]} {p['value']:.4g}{error}{unit}{stuck}"
 
 
-def _alternatives(result: Result) -> str:
-    every = result.get("alternatives") or {}
+def _competing_models(result: Result) -> str:
+    every = result.get("competing_models") or {}
     rows = [
         [
             text(name),
             text(r["name"]),
-            f"{number(r['error_after'])}×",
+            f"{number(r['residual_after'])}×",
             "–" if r["collinearity"] is None else f"{r['collinearity']:.3f}",
-            "yes" if r["told_apart"] else tag("strong", "no"),
+            "yes" if r["distinguishable"] else tag("strong", "no"),
         ]
         for name, others in every.items()
         for r in others
@@ -174,9 +175,10 @@ def _alternatives(result: Result) -> str:
         return ""
     lead = (
         "Each effect that was found, and what was tried in its place with all else refitted. Collinearity 1 means "
-        "that both change the records alike beyond what free parameters can; told apart means that the error decides."
+        "that both change the records alike beyond what free parameters can; distinguishable means that the "
+        "residual decides."
     )
-    head = ["Found", "In its place", "Held-out error", "Collinearity", "Told apart"]
+    head = ["Found", "In its place", "Validation residual", "Collinearity", "Distinguishable"]
     return section("Why not another", lead, table(head, rows))
 
 
@@ -195,7 +197,7 @@ def _parameters(result: Result) -> str:
         [
             text(p["key"]),
             f"{p['value']:.5g}",
-            "not told" if p["standard_error"] is None else f"{p['standard_error']:.2g}",
+            "not identifiable" if p["standard_error"] is None else f"{p['standard_error']:.2g}",
             "" if p["interval"] is None or p["interval"][0] is None else "{:.4g} … {:.4g}".format(*p["interval"]),
             f"at its {p['at_bound']} value" if p["at_bound"] else "",
             text("" if p["unit"] == "1" else p["unit"]),
@@ -203,7 +205,7 @@ def _parameters(result: Result) -> str:
         for p in result["parameters"]
     ]
     lead = (
-        "All that was fitted. Errors take pieces, and whole records, as independent, and are the larger of the two: "
+        "All that was fitted. Errors take segments, and whole records, as independent, and are the larger of the two: "
         "what differs from experiment to experiment because a law is not quite that of the bench is in them."
     )
     head = ["Parameter", "Value", "Standard error", "95 % interval", "At bound", "Unit"]
@@ -214,14 +216,14 @@ def _method(result: Result) -> str:
     settings = result["settings"]
     noise = "; ".join(
         f"{TITLES.get(channel, channel)} {' … '.join(_range(floors, _UNITS.get(channel, '1')))}"
-        for channel, floors in result["noise_floor"].items()
+        for channel, floors in result["noise_std"].items()
     )
     facts = {
-        "Pieces": f"about {settings['piece']:g} s each, with an initial state of their own that is fitted along",
-        "Held out": "the records named above"
-        if settings["held_out_every"] is None
-        else f"every {_nth(settings['held_out_every'])} stretch of {settings['stretch']} pieces of each record",
-        "Noise floor": noise,
+        "Segments": f"about {settings['segment_length']:g} s, each with its own initial state",
+        "Validation data": "the records named above"
+        if settings["validation_every"] is None
+        else f"every {_nth(settings['validation_every'])} block of {settings['validation_block']} segments",
+        "Noise (standard deviation)": noise,
         "Model file": result["model"]["path"] or "–",
         "Records": ", ".join(r["source"] for r in result["records"]),
     }

@@ -42,7 +42,7 @@ def html(result: Result, place: Figures) -> str:
 
 def _heading(result: Result) -> str:
     kind = tag("div", f"Next experiment · {made_on(result)}", "kind")
-    lead = f"Designed so that the predictions of {len(result['rivals'])} rivals part; nothing has moved yet."
+    lead = f"Designed so that the predictions of {len(result['competing_models'])} rivals part; nothing has moved yet."
     title = tag("h1", text(result["title"].partition(": ")[2]))
     head = tag("header", kind + title + tag("p", text(lead), "lead"), "top")
     return head + tag("div", text(result["verdict"]["text"]), f"verdict {text(result['verdict']['level'])}")
@@ -50,7 +50,11 @@ def _heading(result: Result) -> str:
 
 def _played(result: Result, place: Figures) -> str:
     rows = [
-        [f"{m['start']:.1f} s", text(m["words"]), text(", ".join(f"{k} {v:.3g}" for k, v in m["numbers"].items()))]
+        [
+            f"{m['start']:.1f} s",
+            text(m["description"]),
+            text(", ".join(f"{k} {v:.3g}" for k, v in m["parameters"].items())),
+        ]
         for m in result["movements"]
     ]
     lead = (
@@ -64,15 +68,15 @@ def _played(result: Result, place: Figures) -> str:
 
 
 def _apart(result: Result, place: Figures) -> str:
-    clear = result["settings"]["clear"]
+    clear = result["settings"]["decisive_separation"]
     rows = []
     for p in result["pairs"]:
-        channel = max(p["shares"], key=lambda c: p["shares"][c])
+        channel = max(p["channel_shares"], key=lambda c: p["channel_shares"][c])
         rows.append(
             [
                 text(p["true"]), text(p["refitted"]), number(p["chi_square"]), number(p["separation"]),
-                _chance(p["mistaken"]), _seconds(p["seconds_needed"]),
-                f"{TITLES.get(channel, channel)} ({100.0 * p['shares'][channel]:.0f} %)",
+                _chance(p["misclassification_probability"]), _seconds(p["seconds_needed"]),
+                f"{TITLES.get(channel, channel)} ({100.0 * p['channel_shares'][channel]:.0f} %)",
             ]
         )  # fmt: skip
     head = ["True", "Refitted to it", "χ² left", "Standard deviations", "Chance of mistaking", "Needed", "Mostly in"]
@@ -130,7 +134,7 @@ def _limits(result: Result) -> str:
 
 def traces(result: Result) -> go.Figure:
     """The drive, and each channel as the rivals predict it."""
-    names = [r["name"] for r in result["rivals"]]
+    names = [r["name"] for r in result["competing_models"]]
     channels = [c for c in _UNITS if c in result["traces"]]
     panels = Panels(1 + len(channels), gap=(0.0, 0.025), one_time=True)
     drive = result["traces"]["drive"]
@@ -182,12 +186,12 @@ def differences(pair: dict[str, Any]) -> go.Figure:
 
 def alternatives(result: Result) -> go.Figure:
     """Separation of the closest pair by kind of experiment, as bars."""
-    rows = list(reversed(result["alternatives"]))
+    rows = list(reversed(result["compared_experiments"]))
     panels = Panels(1)
     panels.line(
         0,
         style.values([max(row["separation"], 1e-3) for row in rows]),
-        np.array([first_upper(row["words"]) for row in rows]),
+        np.array([first_upper(row["description"]) for row in rows]),
         type="bar",
         orientation="h",
         marker={"color": [style.HORIZON if row["kind"] == "chosen" else style.MEASURED for row in rows]},
@@ -199,7 +203,7 @@ def alternatives(result: Result) -> go.Figure:
     highest = max(row["separation"] for row in rows)
     panels.x_axis(0, "separation of the closest pair [standard deviations]", range=[0.0, 1.12 * max(highest, 1e-3)])
     panels.y_axis(0, automargin=True, type="category")
-    clear = result["settings"]["clear"]
+    clear = result["settings"]["decisive_separation"]
     if clear < 1.1 * highest:
         panels.shapes.append(
             {"type": "line", "xref": "x", "yref": "y domain", "x0": clear, "x1": clear, "y0": 0, "y1": 1,

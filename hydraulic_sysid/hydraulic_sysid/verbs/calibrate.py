@@ -1,4 +1,4 @@
-"""Fit a model's free parameters to records, and say how well these tell them.
+"""Fit a model's free parameters to records, and say how well these determine them.
 
 Every record is cut into short pieces whose initial states are fitted along, so that the drift of an integrating
 plant does not hide the rest. Writes calibrate.json, a page (report.html) and the calibrated model (model.yaml).
@@ -89,18 +89,18 @@ def _print(result: dict[str, Any], console: Console) -> None:
     table = Table(title="residual over noise", title_justify="left")
     for title in ("record", "", "channel", "before", "after"):
         table.add_column(title, justify="right" if title in ("before", "after") else "left")
-    for part, word in (("fitted", "fitted"), ("held_out", "held out")):
+    for part, word in (("fit", "fit"), ("test", "test")):
         for row in (result[part] or {"records": []})["records"]:
             table.add_row(row["record"], word, row["channel"], f"{row['before']:.3g}", f"{row['after']:.3g}")
     console.print(table)
-    for direction in result["not_told"]:
+    for direction in result["not_identifiable"]:
         parts = ", ".join(f"{k} {w:+.2f}" for k, w in direction["weights"].items())
-        console.print(f"the data do not tell the combination {parts}")
+        console.print(f"the data cannot identify the combination {parts}")
     console.print(result["verdict"]["text"])
 
 
 def _error(value: float) -> str:
-    return f"{value:.2g}" if math.isfinite(value) else "not told"
+    return f"{value:.2g}" if math.isfinite(value) else "not identifiable"
 
 
 if __name__ == "__main__":

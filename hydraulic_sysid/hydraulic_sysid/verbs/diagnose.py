@@ -3,7 +3,7 @@
 Fits what the model calls free, tries every effect of the library that is off, and says what is missing, what these
 data cannot tell apart, that nothing is missing, or what shape it has that no effect explains. What counts must lower
 the error on data that no fit has seen. Writes diagnose.json and a page (report.html); with --apply also model.yaml,
-the model with what was found; for a verdict with several names each rival's model (rival_EFFECT.yaml).
+the model with what was found; for a verdict with several names each rival's model (competing_EFFECT.yaml).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from hydraulic_sysid.verbs import _cli as cli
 from .compare import add_folder_options, add_window_option, read_window, summary_json
 
 MODEL = "model.yaml"
-LONG = ("curves",)
+LONG = ("worst_segments",)
 EPILOG = """\
 examples:
   python -m hydraulic_sysid diagnose --model sample_bench --record examples/sample_bench --out runs/diagnosed
@@ -71,7 +71,7 @@ def check_target(options: argparse.Namespace, verb: str, names: tuple[str, ...])
 
 def _diagnose(options: argparse.Namespace) -> int:
     check_target(options, "diagnose", (MODEL,) if options.apply else ())
-    stale = sorted(options.out.glob("rival_*.yaml")) if options.out.is_dir() else []
+    stale = sorted(options.out.glob("competing_*.yaml")) if options.out.is_dir() else []
     if stale:
         raise DiagnosisError(f"{stale[0]} exists; choose another folder (a model is never overwritten)")
     model = load_model(options.model)
@@ -87,12 +87,12 @@ def _diagnose(options: argparse.Namespace) -> int:
         written.append(options.out / MODEL)
         save_model(done.model, written[-1])
     for name, rival in done.rivals.items():
-        written.append(options.out / f"rival_{name}.yaml")
+        written.append(options.out / f"competing_{name}.yaml")
         save_model(rival, written[-1])
     if done.rivals:
         for name in done.result["verdict"]["effects"]:
             if name not in done.rivals:
-                written.append(options.out / f"rival_{name}.yaml")
+                written.append(options.out / f"competing_{name}.yaml")
                 save_model(done.model, written[-1])
     from hydraulic_sysid.report import write_page
 
@@ -107,17 +107,22 @@ def _diagnose(options: argparse.Namespace) -> int:
 
 def show(result: dict[str, Any], console: Console) -> None:
     """The table and the sentence a user reads in the terminal."""
-    table = Table(title=f"{result['model']['name']}: residual over noise, held out", title_justify="left")
+    table = Table(title=f"{result['model']['name']}: residual over noise on validation data", title_justify="left")
     for title in ("", "effect", "acts on", "before", "after", "parameters"):
         table.add_column(title, justify="right" if title in ("before", "after") else "left")
     for row in result["effects"][:8]:
-        found = "→" if row["found"] else ""
+        found = "→" if row["added"] else ""
         values = ", ".join(
             f"{p['key'].split('.')[1]} {p['value']:.4g}{_error(p)}{'' if p['unit'] == '1' else ' ' + p['unit']}"
             for p in row["parameters"]
         )
         table.add_row(
-            found, row["name"], row["subsystem"], f"{row['error_before']:.4g}", f"{row['error_after']:.4g}", values
+            found,
+            row["name"],
+            row["subsystem"],
+            f"{row['residual_before']:.4g}",
+            f"{row['residual_after']:.4g}",
+            values,
         )
     console.print(table)
     console.print(result["verdict"]["text"])

@@ -75,7 +75,7 @@ def _design(options: argparse.Namespace) -> int:
     noise = _noise(options, diagnosis)
     given = {k: getattr(options, k) for k in _LIMITS if getattr(options, k) is not None}
     limits = replace(limits_of(rivals, options.centre), **given)
-    piece = options.piece or float((diagnosis or {}).get("settings", {}).get("piece", 0.5))
+    piece = options.piece or float((diagnosis or {}).get("settings", {}).get("segment_length", 0.5))
     with Console(stderr=True).status("designing …") as status:
         proposal = next_experiment(
             rivals, limits, noise, options.seconds, lambda text: status.update(f"designing: {text} …"),
@@ -100,9 +100,9 @@ def _diagnosis(folder: Path) -> dict[str, Any]:
 
 
 def _tied(folder: Path, diagnosis: dict[str, Any]) -> dict[str, Model]:
-    """The models between which the diagnosis could not decide: ``rival_<effect>.yaml``, or its own model."""
+    """The models between which the diagnosis could not decide: ``competing_<effect>.yaml``, or its own model."""
     folder = folder if folder.is_dir() else folder.parent
-    files = {file.stem.removeprefix("rival_"): file for file in sorted(folder.glob("rival_*.yaml"))}
+    files = {file.stem.removeprefix("competing_"): file for file in sorted(folder.glob("competing_*.yaml"))}
     rivals = {name: load_model(str(file)) for name, file in files.items()}
     own = folder / "model.yaml"
     if own.is_file():
@@ -113,7 +113,7 @@ def _tied(folder: Path, diagnosis: dict[str, Any]) -> dict[str, Model]:
     if len(rivals) < 2:
         text = diagnosis["verdict"].get("text", "")
         raise NextExperimentError(
-            f"{folder}: holds the models of {len(rivals)} rivals (rival_<effect>.yaml, model.yaml); two or more are "
+            f"{folder}: holds {len(rivals)} competing models (competing_<effect>.yaml, model.yaml); two or more are "
             f"needed. Its verdict: {text}"
         )
     return rivals
@@ -147,7 +147,7 @@ def _noise(options: argparse.Namespace, diagnosis: dict[str, Any] | None) -> dic
         channels = [c for c in MEASURED if all(c in r for r in records)]
         return {c: statistics.median(noise_floor(r[c]) for r in records) for c in channels}
     if diagnosis is not None:
-        return {c: statistics.median(by_record.values()) for c, by_record in diagnosis["noise_floor"].items()}
+        return {c: statistics.median(by_record.values()) for c, by_record in diagnosis["noise_std"].items()}
     raise NextExperimentError("which channels are measured, and how noisy? Name a --record, or --noise CHANNEL=SIGMA …")
 
 
@@ -156,7 +156,9 @@ def _print(result: dict[str, Any], console: Console) -> None:
     for title in ("true", "refitted to it", "apart [σ]", "mistaken", "needs [s]"):
         table.add_column(title, justify="left" if title in ("true", "refitted to it") else "right", no_wrap=True)
     for p in result["pairs"]:
-        mistaken = "< 1e-9" if p["mistaken"] < 1e-9 else f"{p['mistaken']:.1g}"
+        mistaken = (
+            "< 1e-9" if p["misclassification_probability"] < 1e-9 else f"{p['misclassification_probability']:.1g}"
+        )
         table.add_row(p["true"], p["refitted"], number(p["separation"]), mistaken, number(p["seconds_needed"]))
     console.print(table)
     p = result["prediction"]

@@ -51,7 +51,7 @@ def calibrate(
         raise CalibrationError("nothing to fit: no parameter is free (mark one `fit: free` in the model file)")
     same = [h.name for h in held_out if any(_shares_samples(h, r) for r in records)]
     if same:
-        raise CalibrationError(f"held-out records are also among those to fit: {', '.join(same)}")
+        raise CalibrationError(f"test records are also among those to fit: {', '.join(same)}")
     say = progress or (lambda _: None)
     say("residuals before")
     before = evaluate(model, records, settings)
@@ -67,21 +67,21 @@ def calibrate(
         date=date.today().isoformat(),
         change="calibrated " + ", ".join(chosen),
         records=[r.name for r in records],
-        held_out=[r.name for r in held_out],
+        test_records=[r.name for r in held_out],
         error_before=float(f"{before.rms:.4g}"),
         error_after=float(f"{done.rms:.4g}"),
         error_unit="residual over noise",
     )
     held_after = evaluate(calibrated, held_out, settings) if held_out else None
     result = {
-        **heading("calibrate"),
+        **heading("calibrate", 2),
         "model": {"name": model.name, "path": None if model.path is None else str(model.path)},
-        "settings": {"piece": settings.length, "robust": settings.robust},
-        "records": [_about(r, True) for r in records] + [_about(r, False) for r in held_out],
+        "settings": {"segment_length": settings.length, "robust": settings.robust},
+        "records": [_about(r, "fit") for r in records] + [_about(r, "test") for r in held_out],
         "converged": done.converged,
-        "steps": done.steps,
-        "fitted": _residuals(before, done),
-        "held_out": None if held_before is None or held_after is None else _residuals(held_before, held_after),
+        "iterations": done.steps,
+        "fit": _residuals(before, done),
+        "test": None if held_before is None or held_after is None else _residuals(held_before, held_after),
         "parameters": [
             {
                 "key": key,
@@ -93,26 +93,26 @@ def calibrate(
                 "scale": done.scales[key],
                 "bounds": list(bounds[key]),  # type: ignore[arg-type]
                 "at_bound": stuck.get(key),
-                "told": known.standard_errors[key] < BLIND * done.scales[key],
+                "identifiable": known.standard_errors[key] < BLIND * done.scales[key],
             }
             for key in chosen
         ],
         "correlation": {"keys": chosen, "matrix": known.correlation.tolist()},
-        "condition": known.condition,
-        "not_told": [{"weights": d.weights, "error": d.error} for d in known.blind],
+        "condition_number": known.condition,
+        "not_identifiable": [{"weights": d.weights, "error": d.error} for d in known.blind],
     }
     result["verdict"] = _verdict(result)
     return Calibration(calibrated, result)
 
 
-def _about(record: Record, fitted: bool) -> dict[str, Any]:
+def _about(record: Record, role: str) -> dict[str, Any]:
     return {
         "name": record.name,
         "source": str(record.source),
         "samples": len(record),
         "sampling_time": record.dt,
         "duration": record.duration,
-        "fitted": fitted,
+        "role": role,
     }
 
 
@@ -147,7 +147,7 @@ def _residuals(before: Fit, after: Fit) -> dict[str, Any]:
                 {
                     "record": pieces.record.name,
                     "channel": channel,
-                    "noise": float(pieces.noise[c]),
+                    "noise_std": float(pieces.noise[c]),
                     "before": float(old[c]),
                     "after": float(new[c]),
                 }
@@ -169,17 +169,17 @@ def _by_channel(fitted: Fit) -> list[np.ndarray]:
 
 def _verdict(result: dict[str, Any]) -> dict[str, str]:
     """One sentence: how far the error fell, where it stands, and what the data do not tell."""
-    judged = result["held_out"] or result["fitted"]
-    where = "held-out records" if result["held_out"] else "the records fitted (none were held out)"
+    judged = result["test"] or result["fit"]
+    where = "test records" if result["test"] else "the records fitted (there were no test records)"
     level = "explained" if judged["after"] <= EXACT else "off"
     text = f"On {where} the residual went from {judged['before']:.3g} to {judged['after']:.3g} times the noise" + (
         "; nothing is left to explain."
         if level == "explained"
         else "; something is left that no free parameter explains."
     )
-    vague = [p["key"] for p in result["parameters"] if not p["told"]]
+    vague = [p["key"] for p in result["parameters"] if not p["identifiable"]]
     if vague:
-        text += f" These data do not tell {', '.join(vague)}."
+        text += f" These data cannot identify {', '.join(vague)}."
     if not result["converged"]:
         text += " The fit has not converged."
     return {"level": level, "text": text}

@@ -52,30 +52,30 @@ def document(design: Design) -> dict[str, Any]:
     plan, search = design.plan, design.search
     assert plan.prediction is not None
     return {
-        **heading("next_experiment"),
+        **heading("next_experiment", 2),
         "verdict": _verdict(design),
         "title": f"Next experiment: {_or(list(design.rivals))}?",
-        "rivals": [
+        "competing_models": [
             {"name": name, "model": model.name, "path": None if model.path is None else str(model.path),
              "effects": list(model.effects), "fitted": search.points[i].keys}
             for i, (name, model) in enumerate(design.rivals.items())
         ],
         "settings": {
             "seconds": plan.active_time, "rate": search.bench.rate, "centre": search.bench.centre,
-            "piece": search.length, "margin": 1.0 - MARGIN, "clear": CLEAR,
+            "segment_length": search.length, "margin": 1.0 - MARGIN, "decisive_separation": CLEAR,
         },
-        "noise": dict(search.noise),
+        "noise_std": dict(search.noise),
         "limits": asdict(search.limits),
         "file": None,
         "plan": {k: v for k, v in plan.as_mapping().items() if k != "prediction"},
         "prediction": plan.prediction.as_mapping(),
         "movements": [
-            {"kind": c.movement.kind, "words": c.movement.family.words, "numbers": dict(c.movement.numbers),
+            {"kind": c.movement.kind, "description": c.movement.family.words, "parameters": dict(c.movement.numbers),
              "start": plan.signal_start + begin / search.bench.rate}
             for c, begin in zip(design.chosen, design.played.begins, strict=True)
         ],
         "pairs": [_pair(design, r) for r in design.refits],
-        "alternatives": _alternatives(design),
+        "compared_experiments": _compared(design),
         "traces": {
             "drive": _traced(design.seen[0], "drive"),
             **{
@@ -97,11 +97,11 @@ def _pair(design: Design, refit: Refit) -> dict[str, Any]:
         "refitted": design.name(r),
         "chi_square": refit.left,
         "separation": refit.separation,
-        "mistaken": refit.mistaken,
+        "misclassification_probability": refit.mistaken,
         "seconds_needed": _seconds(design, refit),
         "rms": float(np.sqrt(np.mean(refit.series**2))),
         "converged": refit.converged,
-        "shares": refit.shares,
+        "channel_shares": refit.shares,
         "parameters": [
             {"key": k, "unit": model.parameter(k).unit, "before": model.value(k), "after": v}
             for k, v in refit.values.items()
@@ -112,7 +112,7 @@ def _pair(design: Design, refit: Refit) -> dict[str, Any]:
     }
 
 
-def _alternatives(design: Design) -> list[dict[str, Any]]:
+def _compared(design: Design) -> list[dict[str, Any]]:
     """The best of every kind of movement, repeated over the same time: the least separation of all pairs, best first.
 
     By the sensitivities at the rivals' parameters; ``chosen`` is the sequence by the same measure.
@@ -122,10 +122,10 @@ def _alternatives(design: Design) -> list[dict[str, Any]]:
     for other in design.chosen[1:]:
         sequence = sequence + other.evidence
     best = _least(design, sequence.left(points), 1)
-    rows = [{"kind": "chosen", "words": "the sequence chosen", "numbers": {}, **best}]
+    rows = [{"kind": "chosen", "description": "the sequence chosen", "parameters": {}, **best}]
     for kind, family in FAMILIES.items():
         found = [
-            {"kind": kind, "words": family.words, "numbers": dict(c.movement.numbers),
+            {"kind": kind, "description": family.words, "parameters": dict(c.movement.numbers),
              **_least(design, c.evidence.left(points), places)}
             for c in design.candidates
             if c.movement.kind == kind

@@ -28,12 +28,12 @@ def curves(split: Split, before: Stage, after: Stage) -> list[dict[str, Any]]:
         rows.append(
             {
                 "record": pieces.record.name,
-                "held_out": bool(not split.fitted[i][k]),
+                "role": "fit" if split.fitted[i][k] else "validation",
                 "time": (start + np.arange(pieces.samples)) * pieces.record.dt,
                 "drive": pieces.record["drive"][start : start + pieces.samples],
                 "channels": {
                     c: {
-                        "noise": float(pieces.noise[j]),
+                        "noise_std": float(pieces.noise[j]),
                         "measured": measured[:, j],
                         "before": measured[:, j] - _residual(before, i, k, shape)[:, j] * pieces.noise[j],
                         "after": measured[:, j] - _residual(after, i, k, shape)[:, j] * pieces.noise[j],

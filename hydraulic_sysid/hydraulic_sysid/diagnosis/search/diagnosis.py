@@ -119,10 +119,10 @@ def finished(found: Found, known: Mapping[str, Known], records: Sequence[Record]
             date=date.today().isoformat(),
             change=f"added {name}",
             records=[r.name for r in records],
-            held_out=[r.name for r in held_out] or "every third stretch of each record",
+            validation_records=[r.name for r in held_out] or "every third block of each record",
             error_before=float(f"{before.rms_held_out:.4g}"),
             error_after=float(f"{after.rms_held_out:.4g}"),
-            error_unit="residual over noise, held out",
+            error_unit="residual over noise, validation data",
         )
         before = after
     return done

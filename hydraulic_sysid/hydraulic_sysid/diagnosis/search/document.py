@@ -41,21 +41,25 @@ def document(
     effects = _effects(found, rivals, known)
     levels = {"explained": final.level.variance <= 1.0 + 2.0 * verdict.UNSEEN, "off": kind == verdict.OUTSIDE}
     return {
-        **heading("diagnose"),
+        **heading("diagnose", 2),
         "model": model_document(model),
-        "settings": {"piece": settings.length, "stretch": STRETCH, "held_out_every": None if held_out else EVERY},
+        "settings": {
+            "segment_length": settings.length,
+            "validation_block": STRETCH,
+            "validation_every": None if held_out else EVERY,
+        },
         "records": [
             {
                 "name": r.name,
                 "source": str(r.source),
                 "duration": r.duration,
                 "samples": len(r),
-                "held_out": any(r is h for h in held_out),
+                "role": "validation" if any(r is h for h in held_out) else "fit",
             }
             for r in (*records, *held_out)
         ],  # fmt: skip
         "channels": channels,
-        "noise_floor": _noise(parts),
+        "noise_std": _noise(parts),
         "verdict": {
             "kind": kind,
             "level": "explained" if levels["explained"] else "off" if levels["off"] else "close",
@@ -64,16 +68,20 @@ def document(
             "text": verdict.sentences(found, rivals, kind, shapes, family) + verdict.warning(named, imitations),
             "imitated": imitations,
         },
-        "error": {"unit": "residual over noise", "before": _level(base.level), "after": _level(final.level)},
-        "steps": [{"name": name, **_level(at)} for name, at in found.steps],
+        "residual": {
+            "unit": "residual over noise",
+            "before": _level(base.level),
+            "after": _level(final.level),
+            "after_each_effect": [{"name": name, **_level(at)} for name, at in found.steps],
+        },
         "effects": effects,
-        "alternatives": {
+        "competing_models": {
             name: [
                 {
                     "name": r.name,
-                    "error_after": r.level.rms_held_out,
-                    "margin": r.margin,
-                    "told_apart": r.told_apart,
+                    "residual_after": r.level.rms_held_out,
+                    "chi_square_difference": r.margin,
+                    "distinguishable": r.told_apart,
                     "collinearity": r.collinearity,
                 }
                 for r in every
@@ -81,11 +89,11 @@ def document(
             for name, every in rivals.items()
         },
         "parameters": _parameters(final.model, known, [k for k in final.anchor.keys]),
-        "left_over": verdict.left_over(found),
-        "shapes": [_shape(s) for s in shapes],
-        "nearest": [t.name for t in final.trials[:_NEAREST]] if kind == verdict.OUTSIDE else [],
+        "unexplained_share": verdict.left_over(found),
+        "nonparametric_curves": [_shape(s) for s in shapes],
+        "nearest_effects": [t.name for t in final.trials[:_NEAREST]] if kind == verdict.OUTSIDE else [],
         "balances": [],
-        "curves": curves(parts, base, final),
+        "worst_segments": curves(parts, base, final),
     }
 
 
@@ -97,20 +105,20 @@ def added_document(
     whole = document(model, records, held_out, parts, settings, found, {}, {}, known, verdict.MISSING, ())
     before, after = found.base.level.rms_held_out, found.final.level.rms_held_out
     name = found.added[0]
-    whole |= heading("add")
+    whole |= heading("add", 2)
     whole["verdict"] |= {
         "kind": "confirmed" if confirmed else "not confirmed",
         "level": whole["verdict"]["level"] if confirmed else "off",
         "text": f"With {name} the residual on held-out data goes from {before:.4g} to {after:.4g} times the noise"
         + ("." if confirmed else ": no more than chance or fitting gives; the data do not bear it out."),
     }
-    for key in ("alternatives", "shapes", "nearest", "balances"):
+    for key in ("competing_models", "nonparametric_curves", "nearest_effects", "balances"):
         del whole[key]
     return whole
 
 
 def _level(at: Level) -> dict[str, float]:
-    return {"fitted": at.rms_fitted, "held_out": at.rms_held_out}
+    return {"fit": at.rms_fitted, "validation": at.rms_held_out}
 
 
 def _named(
@@ -150,10 +158,10 @@ def _effects(found: Found, rivals: Mapping[str, Sequence[Rival]], known: Mapping
                 {
                     "name": prospect.effect.name,
                     "subsystem": subsystem(prospect.effect),
-                    "found": False,
+                    "added": False,
                     "refitted": False,
-                    "error_before": found.base.level.rms_fitted,
-                    "error_after": math.sqrt(left / count),
+                    "residual_before": found.base.level.rms_fitted,
+                    "residual_after": math.sqrt(left / count),
                     "parameters": [],
                 }
             )
@@ -167,10 +175,10 @@ def _row(
     return {
         "name": name,
         "subsystem": subsystem(effect),
-        "found": found,
+        "added": found,
         "refitted": True,
-        "error_before": before.rms_held_out,
-        "error_after": after.rms_held_out,
+        "residual_before": before.rms_held_out,
+        "residual_after": after.rms_held_out,
         "parameters": _parameters(model, known, [f"{name}.{p.name}" for p in effect.parameters]),
     }
 
@@ -216,7 +224,7 @@ def add_balances(
     """Put balances into a document. ``blamed``: subsystems by what they explain of them, the most first; it says where
     something outside the library is, unless a curve explains most of that."""
     result["balances"] = _balances(before, after)
-    curve = result["shapes"][0]["share"] if result["shapes"] else 0.0
+    curve = result["nonparametric_curves"][0]["explained_share"] if result["nonparametric_curves"] else 0.0
     if result["verdict"]["kind"] == verdict.OUTSIDE and curve <= _TELLING and blamed:
         result["verdict"]["subsystem"] = blamed[0]
 
@@ -228,9 +236,9 @@ def _shape(s: Shape) -> dict[str, Any]:
         "summary": s.summary,
         "variable": s.variable,
         "unit": s.unit,
-        "share": s.share,
-        "center": np.asarray(s.centre),
-        "height": np.asarray(s.height),
+        "explained_share": s.share,
+        "knots": np.asarray(s.centre),
+        "value": np.asarray(s.height),
         "low": np.asarray(s.height - s.error),
         "high": np.asarray(s.height + s.error),
     }

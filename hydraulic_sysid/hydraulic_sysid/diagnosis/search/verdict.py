@@ -13,7 +13,7 @@ from .search import Found
 from .shape import Shape
 
 MISSING = "missing"
-TIED = "cannot be told apart"
+TIED = "indistinguishable"
 COMPLETE = "complete"
 OUTSIDE = "outside the library"
 

@@ -195,15 +195,15 @@ def _print(analysis: offline.Analysis, console: Console) -> None:
     if analysis.left_out:
         console.print(analysis.left_out)
     console.print(compared["verdict"]["text"])
-    diagnosed = analysis.diagnosed
-    levels = [diagnosed["error"]["before"], *diagnosed["steps"]]
-    names = ["as it is", *(f"+ {s['name']}" for s in diagnosed["steps"])]
-    table = Table(title="diagnosis: residual over noise, held out (1: an exact model)", title_justify="left")
+    residual = analysis.diagnosed["residual"]
+    added = residual["after_each_effect"]
+    names = ["as it is", *(f"+ {s['name']}" for s in added)]
+    table = Table(title="diagnosis: residual over noise on validation data (1: an exact model)", title_justify="left")
     for name in names:
         table.add_column(name, justify="right")
-    table.add_row(*(number(at["held_out"]) for at in levels))
+    table.add_row(*(number(at["validation"]) for at in (residual["before"], *added)))
     console.print(table)
-    console.print(diagnosed["verdict"]["text"])
+    console.print(analysis.diagnosed["verdict"]["text"])
 
 
 def _cell(figures: dict[str, Any] | None, unit: str) -> str:
