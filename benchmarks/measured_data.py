@@ -84,7 +84,7 @@ def festo(folder: Path) -> None:
         for structure in (Arx(ArxOrder(3, 3, 1)), Arx(ArxOrder(3, 3, 1), True), TransferFunction(), StateSpace()):
             settings = Settings(structure=structure, sampling_time=dt, input=drive, output=output)
             try:
-                held = identify(records, settings=settings)["validation"]
+                held = identify(records, settings=settings)["test"]
             except IdentificationError as error:
                 print(f"    {structure.text:40s} {error}")
                 continue

@@ -41,7 +41,7 @@ def test_records_splits_and_bands_are_those_of_the_paper(run: Any) -> None:
     by_name = {e["name"]: e for e in run[1]["excitations"]}
     for kind, held_from in (("chirp", 40.0), ("multisine", 25.0)):
         assert by_name[kind]["duration"] == pytest.approx(50.0)
-        assert by_name[kind]["held_out_from"] == pytest.approx(held_from)
+        assert by_name[kind]["test_from"] == pytest.approx(held_from)
     chirp, tones = by_name["chirp"]["plan"]["signal"], by_name["multisine"]["plan"]["signal"]
     assert [chirp["frequency_start"], chirp["frequency_end"]] == pytest.approx([0.1 * bandwidth, 2.0 * bandwidth])
     assert tones["frequencies"] == pytest.approx([0.1 * bandwidth, 0.5 * bandwidth, 2.0 * bandwidth])

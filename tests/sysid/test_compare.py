@@ -68,17 +68,17 @@ def test_exact_model_is_at_the_floor_everywhere(exact: dict[str, Any], mode: str
 
 def test_exact_model_is_called_so_and_nothing_is_claimed(exact: dict[str, Any]) -> None:
     assert exact["verdict"]["level"] == "explained"
-    assert {f["kind"] for f in exact["findings"]} <= {"at_floor", "drift"}
+    assert {f["kind"] for f in exact["findings"]} <= {"at_noise", "drift"}
     for maps in exact["error_maps"].values():
         for variable, m in maps.items():
-            assert m["explained"] < max(0.1, m["chance"]), variable
+            assert m["explained"] < max(0.1, m["chance_level"]), variable
 
 
 def test_noise_is_found_in_the_data(exact: dict[str, Any]) -> None:
     for record in exact["records"]:
         for channel, sigma in NOISE.items():
-            assert record["channels"][channel]["noise"] == pytest.approx(sigma, rel=0.1)
-        assert record["channels"]["load_pressure"]["noise"] == pytest.approx(np.hypot(1.5e4, 1.5e4), rel=0.1)
+            assert record["channels"][channel]["noise_std"] == pytest.approx(sigma, rel=0.1)
+        assert record["channels"]["load_pressure"]["noise_std"] == pytest.approx(np.hypot(1.5e4, 1.5e4), rel=0.1)
 
 
 def test_missing_dead_band_shows_over_the_drive_as_a_change_of_sign(wrong: dict[str, Any]) -> None:
@@ -117,7 +117,7 @@ def test_horizon_restarts_from_the_measurement_and_free_run_drifts(model: Model)
 def test_error_growth_ends_where_the_horizon_table_begins(wrong: dict[str, Any]) -> None:
     for record in wrong["records"]:
         growth = record["error_growth"]
-        assert growth["lead"][-1] == pytest.approx(0.5)
+        assert growth["lead_time"][-1] == pytest.approx(0.5)
         assert growth["position"]["rms"][-1] == pytest.approx(
             record["channels"]["position"]["horizon"]["rmse"], rel=0.2
         )
@@ -159,8 +159,8 @@ def test_slow_error_has_few_independent_samples() -> None:
     for seed in range(5):
         variable = np.repeat(np.random.default_rng(seed).standard_normal(40), 500)
         m = error_map(slow, Binning.of(variable), folds)
-        assert m.chance > 0.1
-        assert m.explained < m.chance
+        assert m.chance_level > 0.1
+        assert m.explained < m.chance_level
 
 
 def test_map_statistics_and_missing_samples() -> None:

@@ -182,11 +182,11 @@ def test_the_document_says_how_nonlinear_the_plant_is() -> None:
     plan = multisine(OddRandomPhaseMultisine, 3)
     result = respond([record(plan, lambda u: linear(u) + 0.03 * linear(u) ** 3, 1e-4)], Settings(output="position"))
     assert result["method"] == "bla"
-    assert result["levels"]["odd_distortion"] > -40.0
-    assert result["levels"]["even_distortion"] is None or result["levels"]["even_distortion"] < -60.0
+    assert result["levels_db"]["odd_distortion"] > -40.0
+    assert result["levels_db"]["even_distortion"] is None or result["levels_db"]["even_distortion"] < -60.0
     assert result["verdict"]["level"] == "close"
     assert "No linear model can fit" in result["verdict"]["text"]
-    assert 90.0 < result["linear_share"] < 99.9
+    assert 90.0 < result["linear_fit_limit"] < 99.9
     clean = respond([record(plan, linear, 1e-4)])
     assert clean["verdict"]["level"] == "explained"
 
@@ -197,7 +197,7 @@ def test_what_no_linear_model_can_fit_is_what_the_best_one_leaves() -> None:
     told, left = [], []
     for seed in range(1, 13):
         one = record(multisine(OddRandomPhaseMultisine, seed), lambda u: linear(u) + 0.05 * linear(u) ** 3)
-        told.append(100.0 - respond([one])["linear_share"])
+        told.append(100.0 - respond([one])["linear_fit_limit"])
         cut = periods_of(one)
         output, drive = np.fft.rfft(cut.output[0]), np.fft.rfft(cut.drive[0])
         shape = np.zeros_like(output)
@@ -219,7 +219,7 @@ def test_the_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.Captur
     assert main([*arguments, "--out", str(tmp_path / "welch")]) == 0
     documents = [json.loads((tmp_path / n / "frequency_response.json").read_text()) for n in ("bla", "welch")]
     assert [d["method"] for d in documents] == ["bla", "welch"]
-    assert documents[1]["levels"] is None
+    assert documents[1]["levels_db"] is None
     assert "Plotly" in (tmp_path / "bla" / "report.html").read_text(encoding="utf-8")
     assert main([*arguments, "--output", "pressure_a", "--out", str(tmp_path / "none")]) == 2
     assert "no channel 'pressure_a'" in capsys.readouterr().err

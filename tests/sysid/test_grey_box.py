@@ -54,7 +54,7 @@ def test_a_wrong_gain_is_a_linear_thing_and_is_told_from_noise(model: Model) -> 
     share = result["channels"]["velocity"]["shares"]
     assert share["linear"] > 0.9
     assert result["verdict"]["level"] == "off"
-    side = result["channels"]["velocity"]["held_out"]
+    side = result["channels"]["velocity"]["test"]
     assert side["grey"] < 0.35 * side["white"]
 
 
@@ -65,7 +65,7 @@ def test_a_dead_band_is_a_nonlinear_thing_and_shows_in_the_terms(model: Model) -
     channel = result["channels"]["velocity"]
     # A lower gain comes close to a dead band, but not as close as a bend does.
     assert channel["shares"]["linear"] + channel["shares"]["nonlinear"] > 0.8
-    assert channel["held_out"]["grey"] < 0.8 * channel["held_out"]["linear"] < 0.5 * channel["held_out"]["white"]
+    assert channel["test"]["grey"] < 0.8 * channel["test"]["linear"] < 0.5 * channel["test"]["white"]
     assert {"direction of motion", "|drive|", "drive·|drive|"} & {t["name"] for t in channel["terms"]} or any(
         "bend" in t["name"] for t in channel["terms"]
     )
@@ -104,7 +104,7 @@ def test_the_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.Captur
     arguments = ["--model", "sample_bench", "--record", str(SAMPLE / "steps.csv.gz"), str(SAMPLE / "triangle.csv.gz")]
     assert greybox.main([*arguments, "--out", str(tmp_path)]) == 0
     result = results.read_result(tmp_path / "greybox.json")
-    assert result["schema"] == "hydraulic_sysid.greybox/1"
+    assert result["schema"] == "hydraulic_sysid.greybox/2"
     assert result["channels"]["velocity"]["shares"]["nonlinear"] > 0.5
     assert "What is left" in (tmp_path / "report.html").read_text()
     assert " ".join(result["verdict"]["text"].split()) in " ".join(capsys.readouterr().out.split())

@@ -31,16 +31,16 @@ def plant(n: int, seed: int, noise: float) -> Record:
 def test_final_prediction_error_foresees_the_held_out_error() -> None:
     settings = Settings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT, holdout=0.5)
     result = identify([plant(8000, 1, 0.02)], settings=settings)
-    assert result["validation"]["mse_one_step"] == pytest.approx(result["validation"]["fpe"], rel=0.1)
-    assert result["validation"]["fpe"] == pytest.approx(0.02**2, rel=0.1)
-    tests = result["validation"]["records"][0]["residual_tests"]
+    assert result["test"]["mse_one_step"] == pytest.approx(result["test"]["fpe"], rel=0.1)
+    assert result["test"]["fpe"] == pytest.approx(0.02**2, rel=0.1)
+    tests = result["test"]["records"][0]["residual_tests"]
     assert np.mean(np.abs(tests["autocorrelation"][1:]) > tests["bound"]) < 0.2
     assert np.mean(np.abs(tests["cross_correlation"]) > tests["bound"]) < 0.2
 
 
 def test_too_low_an_order_fails_the_residual_tests() -> None:
     settings = Settings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT, holdout=0.5)
-    tests = identify([plant(8000, 2, 0.02)], settings=settings)["validation"]["records"][0]["residual_tests"]
+    tests = identify([plant(8000, 2, 0.02)], settings=settings)["test"]["records"][0]["residual_tests"]
     assert np.mean(np.abs(tests["autocorrelation"][1:]) > tests["bound"]) > 0.3
 
 
@@ -50,7 +50,7 @@ def test_held_out_part_has_no_say_in_the_fit() -> None:
     settings = Settings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT)
     clean, dirty = (identify([r], settings=settings) for r in (first, record_of(spoilt, first["drive"])))
     assert clean["model"]["coefficients"] == dirty["model"]["coefficients"]
-    assert dirty["validation"]["best_fit_free_run"] < 50.0 < clean["validation"]["best_fit_free_run"]
+    assert dirty["test"]["best_fit_free_run"] < 50.0 < clean["test"]["best_fit_free_run"]
 
 
 def test_unstable_model_is_called_unstable() -> None:
@@ -59,8 +59,8 @@ def test_unstable_model_is_called_unstable() -> None:
     result = identify([record_of(y, u)], settings=Settings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT))
     assert result["verdict"]["level"] == "off"
     assert "unstable (pole at |z| = 1.05)" in result["verdict"]["text"]
-    assert np.isnan(result["validation"]["best_fit_free_run"])
-    assert result["validation"]["best_fit_one_step"] > 99.0
+    assert np.isnan(result["test"]["best_fit_free_run"])
+    assert result["test"]["best_fit_one_step"] > 99.0
 
 
 @pytest.mark.parametrize(

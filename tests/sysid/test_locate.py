@@ -46,7 +46,7 @@ def exact(model: Model) -> dict[str, Any]:
 
 
 def first(result: Mapping[str, Any]) -> dict[str, Any]:
-    return result["subsystem"][0]
+    return result["attribution"][0]
 
 
 def test_exact_model_is_at_its_noise_and_nobody_is_blamed(exact: dict[str, Any]) -> None:
@@ -54,8 +54,8 @@ def test_exact_model_is_at_its_noise_and_nobody_is_blamed(exact: dict[str, Any])
     assert {b["name"] for b in exact["balances"]} == {"force", "flow_a", "flow_b", "valve", "continuity"}
     for b in exact["balances"]:
         assert 0.85 < b["ratio"] < 1.15, b["name"]
-    assert exact["misfit"]["parameters_moved"] < 1.1 * exact["misfit"]["exact_model"]
-    assert not [f for f in exact["findings"] if f["kind"] in ("blame", "violated")]
+    assert exact["misfit"]["refitted"] < 1.1 * exact["misfit"]["exact_model"]
+    assert not [f for f in exact["findings"] if f["kind"] in ("attribution", "violated")]
 
 
 def test_exact_model_is_white_within_the_bounds_of_n_samples(exact: dict[str, Any]) -> None:
@@ -85,7 +85,7 @@ def test_subsystem_of_a_missing_effect_is_found(model: Model, effect: str) -> No
     plant = model.with_effect(effect, values)
     result = locate(model, [record_of(plant, 2), record_of(plant, 3)], maps=False)
     assert result["verdict"]["level"] != "explained"
-    assert first(result)["name"] == subsystem, [(s["name"], s["alone"]) for s in result["subsystem"]]
+    assert first(result)["name"] == subsystem, [(s["name"], s["alone"]) for s in result["attribution"]]
     assert first(result)["share"] > 0.5
 
 
@@ -93,7 +93,7 @@ def test_wrong_free_parameter_is_no_fault_of_a_subsystem(model: Model) -> None:
     """The mass is off by a tenth: the force balance shows it, and no subsystem is blamed for it."""
     plant = model.with_values({"moving_mass": 550.0, "viscous_friction.coefficient": 180.0})
     result = locate(model, [record_of(plant, 4), record_of(plant, 5)], maps=False)
-    assert result["misfit"]["model"] > 1.2 * result["misfit"]["parameters_moved"]
+    assert result["misfit"]["model"] > 1.2 * result["misfit"]["refitted"]
     assert result["verdict"]["level"] == "explained"
 
 
@@ -113,7 +113,7 @@ def test_fault_that_no_effect_of_the_library_makes(model: Model) -> None:
         records.append(replace(r, channels={**r.channels, "position": r["position"] + ripple}))
     result = locate(model, records)
     assert first(result)["name"] == "sensor"
-    assert next(iter(first(result)["over"])) == "position"
+    assert next(iter(first(result)["variables"])) == "position"
     continuity = next(b for b in result["balances"] if b["name"] == "continuity")
     assert continuity["ratio"] > 5.0
 
@@ -136,7 +136,7 @@ def test_fewer_channels_allow_fewer_balances_and_say_so(model: Model) -> None:
     missing = {m["name"]: m["why"] for m in one["not_formed"]}
     assert "pressure_b" in missing["force"] and set(missing) == {"force", "flow_b", "spool", "supply"}
     none = locate(model, [record_of(plant, 12, ("position",))])
-    assert none["balances"] == [] and none["subsystem"] == [] and none["misfit"] is None
+    assert none["balances"] == [] and none["attribution"] == [] and none["misfit"] is None
     assert "pressures" in none["verdict"]["text"]
 
 
@@ -174,8 +174,8 @@ def test_what_allows_no_balance_is_named(model: Model) -> None:
 
 def test_document_is_plain_data(exact: dict[str, Any]) -> None:
     document = plain(exact)
-    assert document["schema"] == "hydraulic_sysid.locate/1"
-    assert {"balances", "subsystem", "whiteness", "misfit", "findings", "verdict"} <= set(document)
+    assert document["schema"] == "hydraulic_sysid.locate/2"
+    assert {"balances", "attribution", "whiteness", "misfit", "findings", "verdict"} <= set(document)
     for b in document["balances"]:
-        assert set(b["maps"]) <= {"velocity", "opening", "load_pressure", "position", "time", "direction"}
-        assert len(b["spectrum"]["frequency"]) == len(b["spectrum"]["noise"])
+        assert set(b["error_maps"]) <= {"velocity", "opening", "load_pressure", "position", "time", "direction"}
+        assert len(b["spectrum"]["frequency"]) == len(b["spectrum"]["exact"])

@@ -125,13 +125,13 @@ def test_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.CaptureFix
     told = capsys.readouterr().out
     assert "valve" in told and "Force balance" in told
     document = json.loads((tmp_path / "locate.json").read_text())
-    assert document["schema"] == "hydraulic_sysid.locate/1"
-    assert document["subsystem"][0]["name"] == "valve"
+    assert document["schema"] == "hydraulic_sysid.locate/2"
+    assert document["attribution"][0]["name"] == "valve"
     page = (tmp_path / "report.html").read_text()
     assert document["verdict"]["text"] in page and "Which balance is violated" in page
     assert main([*call, "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
-    assert shown["verdict"] == document["verdict"] and "maps" not in shown["balances"][0]
+    assert shown["verdict"] == document["verdict"] and "error_maps" not in shown["balances"][0]
 
 
 def test_verb_names_what_it_cannot_use(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

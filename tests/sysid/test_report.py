@@ -96,8 +96,8 @@ def test_every_figure_function_makes_one(comparison: dict[str, Any], folder: Pat
         compare_figures.spectra(comparison, 0),
         compare_figures.growth(comparison, 1),
         *(compare_figures.error_maps(comparison, c, r) for c in comparison["channels"] for r in (None, 0, 1)),
-        identify_figures.overlay(identification, "validation", 0),
-        identify_figures.residual_tests(identification, "estimation", 0),
+        identify_figures.overlay(identification, "test", 0),
+        identify_figures.residual_tests(identification, "fit", 0),
         identify_figures.poles(identification),
     ]
     assert all(f.data for f in made)

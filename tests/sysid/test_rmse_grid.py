@@ -38,7 +38,7 @@ def test_every_drive_is_tried_and_the_plant_starts_where_it_keeps_off_its_stops(
     assert len(cells) == 4 * 2 * 2
     by = {(c["shape"], c["amplitude"], c["frequency"]): c for c in cells}
     assert by["sine", 1.0, 1.0]["models"]["tf"]["best_fit"] > 99.0
-    assert by["sine", 1.0, 1.0]["models"]["tf"]["rmse"] < 0.01 * by["sine", 1.0, 1.0]["spread"]
+    assert by["sine", 1.0, 1.0]["models"]["tf"]["rmse"] < 0.01 * by["sine", 1.0, 1.0]["std"]
     # Full drive for ten seconds is more than the stroke.
     assert not by["square", 10.0, 0.05]["within_travel"]
     assert by["square", 10.0, 0.05]["models"]["tf"]["best_fit"] < 90.0

@@ -48,7 +48,7 @@ def test_grid_and_records_in_one_document_and_on_one_page(files: list[str], tmp_
     assert result["summary"]["poor"]["worst"]["best_fit"] < 60.0
     one_step = result["records"][0]["models"]["poor"]
     assert one_step["best_fit_one_step"] > one_step["best_fit"]
-    assert one_step["residual_tests"]["level"] == 0.99
+    assert one_step["residual_tests"]["confidence"] == 0.99
     page = (tmp_path / "report.html").read_text()
     assert "Validation of identified models" in page and "good fits best" in page
     printed = " ".join(capsys.readouterr().out.split())

@@ -39,11 +39,11 @@ def test_compare_prints_json_that_another_program_reads(tmp_path: Path, capsys: 
 def test_identify_holds_the_last_part_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert identify.main(["--record", STEPS, "--holdout", "0.25", "--out", str(tmp_path), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert result["estimation"]["records"][0]["samples"] == 120
-    assert result["validation"]["records"][0]["samples"] == 40
-    assert result["validation"]["best_fit_free_run"] > 80.0
-    assert result["validation"]["best_fit_one_step"] > 95.0
-    assert result["validation"]["fpe"] > result["estimation"]["mse"]
+    assert result["fit"]["records"][0]["samples"] == 120
+    assert result["test"]["records"][0]["samples"] == 40
+    assert result["test"]["best_fit_free_run"] > 80.0
+    assert result["test"]["best_fit_one_step"] > 95.0
+    assert result["test"]["fpe"] > result["fit"]["mse"]
     assert (tmp_path / "report.html").exists()
 
 
@@ -52,7 +52,7 @@ def test_identify_holds_whole_records_out(tmp_path: Path, capsys: pytest.Capture
     arguments = ["--record", STEPS, "--holdout-record", other, "--order", "2", "2", "1", "--sampling-time", "0.02"]
     assert identify.main([*arguments, "--out", str(tmp_path)]) == 0
     result = json.loads((tmp_path / "identify.json").read_text())
-    assert [r["name"] for r in result["validation"]["records"]] == ["multisine"]
+    assert [r["name"] for r in result["test"]["records"]] == ["multisine"]
     assert len(result["model"]["poles"]) == 2
     assert result["settings"]["sampling_time"] == 0.02
     printed = capsys.readouterr().out

@@ -150,16 +150,16 @@ def read_bag(bag: Path) -> list[Record]:
 
 def test_the_linear_model_is_judged_on_the_record_that_it_was_not_fitted_to(quick: Finished) -> None:
     identified = quick.result("identify")
-    assert identified["schema"] == "hydraulic_sysid.identify/2"
-    assert [r["name"] for r in identified["estimation"]["records"]] == ["chirp"]
-    assert [r["name"] for r in identified["validation"]["records"]] == ["multisine"]
-    assert identified["validation"]["best_fit_one_step"] > 60.0
+    assert identified["schema"] == "hydraulic_sysid.identify/3"
+    assert [r["name"] for r in identified["fit"]["records"]] == ["chirp"]
+    assert [r["name"] for r in identified["test"]["records"]] == ["multisine"]
+    assert identified["test"]["best_fit_one_step"] > 60.0
     assert identified["verdict"]["text"] in unwrapped(quick.output)
 
 
 def test_the_data_sheet_misses_what_was_hidden(quick: Finished) -> None:
     compared = quick.result("compare")
-    assert compared["schema"] == "hydraulic_sysid.compare/1"
+    assert compared["schema"] == "hydraulic_sysid.compare/2"
     assert compared["model"]["name"] == "moog_mcr_m_1002_bench"
     assert "valve_deadband" not in compared["model"]["effects"]
     assert [r["name"] for r in compared["records"]] == ["chirp", "multisine"]
@@ -172,8 +172,8 @@ def test_the_sensors_are_not_blamed(quick: Finished) -> None:
     """What is the same in both is explained down to the noise, and the noise is estimated as it was set."""
     summary = quick.result("compare")["summary"]
     assert summary["pressure_supply"]["horizon"]["ratio"] < 1.5
-    assert summary["pressure_supply"]["noise"] == pytest.approx(15e3, rel=0.2)
-    assert summary["position"]["noise"] == pytest.approx(21e-6, rel=0.2)  # 20 µm, and steps of 24 µm
+    assert summary["pressure_supply"]["noise_std"] == pytest.approx(15e3, rel=0.2)
+    assert summary["position"]["noise_std"] == pytest.approx(21e-6, rel=0.2)  # 20 µm, and steps of 24 µm
 
 
 def test_the_hidden_dead_band_shows_over_the_valve(quick: Finished) -> None:
@@ -263,4 +263,4 @@ def test_records_of_ones_own_need_no_graph(tmp_path: Path) -> None:
     assert [r["name"] for r in compared["records"]] == ["multisine", "steps", "triangle"]
     assert compared["model"]["name"] == "sample_bench"
     assert compared["summary"]["velocity"]["horizon"]["ratio"] > 1.5
-    assert len(run.result("identify")["validation"]["records"]) == 3
+    assert len(run.result("identify")["test"]["records"]) == 3

@@ -65,5 +65,5 @@ def test_what_was_hidden_is_found_over_can_as_well(run: Finished) -> None:
     assert compared["verdict"]["level"] == "off"
     assert compared["summary"]["velocity"]["horizon"]["ratio"] > 3.0
     identified = run.result("identify")
-    assert [r["name"] for r in identified["validation"]["records"]] == ["multisine"]
-    assert identified["validation"]["best_fit_one_step"] > 60.0
+    assert [r["name"] for r in identified["test"]["records"]] == ["multisine"]
+    assert identified["test"]["best_fit_one_step"] > 60.0

@@ -72,7 +72,7 @@ def document(found: Bandwidth, source: dict[str, Any], coherence: np.ndarray | N
         f"The velocity follows {reach}."
     )
     return {
-        **heading("bandwidth"),
+        **heading("bandwidth", 2),
         "verdict": {"level": "explained", "text": text},
         "title": f"Bandwidth of {source['name']}",
         "model": {"name": source["name"]},

@@ -97,27 +97,27 @@ def identify_model(
     validation = [_figures(model, s, noise_floor_of(s, settings)) for s in try_on]
     fpe = metrics.fpe(model.loss, model.parameters, model.samples)
     result = {
-        **heading("identify", 2),
+        **heading("identify", 3),
         "settings": {
             "structure": {"text": structure.text, **structure.document()},
             "sampling_time": settings.sampling_time,
             "offsets": settings.offsets,
-            "select": settings.select,
+            "criterion": settings.select,
             "input": {"channel": settings.input, "unit": records[0].unit(settings.input)},
             "output": {"channel": settings.output, "unit": records[0].unit(settings.output)},
         },
         "verdict": _verdict(structure, model, validation),
         "model": _model_document(model),
         "orders": tried,
-        "estimation": {**_pooled(estimation), "mse": model.loss, "fpe": fpe, "records": estimation},
-        "validation": {**_pooled(validation), "fpe": fpe, "records": validation},
+        "fit": {**_pooled(estimation), "mse": model.loss, "fpe": fpe, "records": estimation},
+        "test": {**_pooled(validation), "fpe": fpe, "records": validation},
     }
     return result, model
 
 
 def about(result: dict[str, Any]) -> dict[str, Any]:
     """What a model's file says besides the model: name, channels and units, orders, data, and how well it fits."""
-    settings, held = result["settings"], result["validation"]
+    settings, held = result["settings"], result["test"]
     ends = f"{settings['input']['channel']} to {settings['output']['channel']}"
     return {
         "name": f"{settings['structure']['text']} from {ends}",
@@ -126,8 +126,8 @@ def about(result: dict[str, Any]) -> dict[str, Any]:
         "input": settings["input"],
         "output": settings["output"],
         "orders": settings["structure"],
-        "records": [r["source"] for r in result["estimation"]["records"]],
-        "held_out": {
+        "records": [r["source"] for r in result["fit"]["records"]],
+        "test": {
             key: held[key] for key in ("best_fit_free_run", "best_fit_one_step", "mse_free_run", "mse_one_step", "fpe")
         },
     }
@@ -189,7 +189,7 @@ def _figures(model: LinearModel, series: _Series, noise: float) -> dict[str, Any
         "source": str(series.record.source),
         "samples": series.y.size,
         "duration": series.y.size * model.dt,
-        "noise": noise,
+        "noise_std": noise,
         "best_fit_free_run": metrics.best_fit(series.y, free) if runs else float("nan"),
         "best_fit_one_step": _or_nan(metrics.best_fit, series.y[past:], one[past:]),
         "mse_free_run": metrics.mse(series.y, free) if runs else float("nan"),

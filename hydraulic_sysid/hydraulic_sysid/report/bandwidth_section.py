@@ -17,7 +17,7 @@ Result = dict[str, Any]
 
 _SOURCES = {
     "model": "Linearised around rest, without dry friction: the least damping, and so the bandwidth to count on.",
-    "rehearsal": "A probe played on the model, with friction and the damping of an open valve at that amplitude.",
+    "simulation": "A probe played on the model, with friction and the damping of an open valve at that amplitude.",
     "record": "Measured by a probe, with the damping that the plant has at that amplitude.",
 }
 

@@ -119,7 +119,7 @@ def _not_identifiable(result: Result) -> str:
     if not items:
         content = tag("p", "Every parameter, and every combination of them, is identifiable from these records.")
     else:
-        content = tag("ul", "".join(tag("li", text(item), "above_floor") for item in items), "findings")
+        content = tag("ul", "".join(tag("li", text(item), "above_noise") for item in items), "findings")
     lead = (
         "A parameter is not identifiable when its standard error exceeds half its size; a combination, when moving "
         "along it changes the simulation by less than the noise shows. Fix one of its parameters, or excite it."

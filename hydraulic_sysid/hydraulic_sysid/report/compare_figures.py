@@ -38,7 +38,7 @@ def overlay(result: Result, record: int) -> go.Figure:
             _trace(panels, panel, traces[key], factor, label, colour, width, legend=number == 0)
             if key != "measured":
                 _trace(panels, panel + 1, traces[f"{key}_error"], factor, label, colour, 1.0, legend=False)
-        noise = 2.0 * document["channels"][name]["noise"] * factor
+        noise = 2.0 * document["channels"][name]["noise_std"] * factor
         panels.band(panel + 1, -noise, noise)
         panels.y_axis(panel, f"{result['channels'][name]['title']}<br>[{unit}]", nticks=5)
         panels.y_axis(panel + 1, f"error<br>[{unit}]", nticks=5)
@@ -114,7 +114,7 @@ def growth(result: Result, record: int) -> go.Figure:
     )
     channels = [name for name in result["channels"] if name in document]
     return _log_panels(
-        result, channels, document, dict.fromkeys(channels, document["lead"]), parts, "seconds ahead", "{} RMS"
+        result, channels, document, dict.fromkeys(channels, document["lead_time"]), parts, "seconds ahead", "{} RMS"
     )
 
 

@@ -97,7 +97,7 @@ def _error_table(result: Result, mode: str) -> str:
     total = ["All records", *(_cell(result["summary"][c][mode], result["channels"][c]["unit"], "") for c in channels)]
     floor = [
         "Measurement noise",
-        *(quantity(result["summary"][c]["noise"], result["channels"][c]["unit"]) for c in channels),
+        *(quantity(result["summary"][c]["noise_std"], result["channels"][c]["unit"]) for c in channels),
     ]
     rows_html = "".join(
         tag("tr", "".join(x if x.startswith("<td") else tag("td", x) for x in row), css)

@@ -33,8 +33,8 @@ def bode(result: Result) -> go.Figure:
         shown.append((lines, "best linear approximation", style.HORIZON, "markers", 4))
         x = style.values(lines["frequency"])
         for key, name, colour in (
-            ("noise", "its deviation by noise", NOISE),
-            ("total", "its deviation between realisations", ODD),
+            ("noise_std", "its deviation by noise", NOISE),
+            ("total_std", "its deviation between realisations", ODD),
         ):
             if lines[key] is not None:
                 panels.line(
@@ -85,7 +85,7 @@ def levels(result: Result) -> go.Figure | None:
         )  # fmt: skip
         between[between <= 0.0] = np.nan
         parts.append(("differs between realisations", lines["frequency"], between, "#b07cc6", "x"))
-    parts.append(("noise", lines["frequency"], lines["output_noise"], NOISE, "cross"))
+    parts.append(("noise", lines["frequency"], lines["output_noise_std"], NOISE, "cross"))
     for name, x, y, colour, symbol in parts:
         panels.line(
             0,

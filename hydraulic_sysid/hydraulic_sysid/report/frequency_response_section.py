@@ -36,12 +36,12 @@ def _heading(result: Result) -> str:
 
 
 def _cards(result: Result) -> str:
-    if result["levels"] is None:
+    if result["levels_db"] is None:
         return ""
     cards = [
         (title, "<small>below the noise</small>" if value is None else f"{number(value)}<small> dB</small>", note)
         for key, (title, note) in _LEVELS.items()
-        for value in [result["levels"][key]]
+        for value in [result["levels_db"][key]]
         if _was_told(result, key)
     ]
     return tag(

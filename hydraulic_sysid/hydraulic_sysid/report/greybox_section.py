@@ -68,7 +68,7 @@ def traces(channel: Result, record: int) -> go.Figure:
 
 def _heading(result: Result) -> str:
     kind = f"Grey box · {made_on(result)}"
-    lead = f"Fitted to {', '.join(result['fitted'])}; tried on {', '.join(result['held_out'])}"
+    lead = f"Fitted to {', '.join(result['fit'])}; tried on {', '.join(result['test'])}"
     verdict = result["verdict"]
     head = tag(
         "header", tag("div", kind, "kind") + tag("h1", text(result["title"])) + tag("p", text(lead), "lead"), "top"
@@ -80,7 +80,7 @@ def _shares(result: Result, place: Figures) -> str:
     rows = [
         [
             first_upper(c["title"]),
-            *(quantity(c["held_out"][key], c["unit"]) for key in ("white", "linear", "grey", "exact")),
+            *(quantity(c["test"][key], c["unit"]) for key in ("white", "linear", "grey", "exact")),
             *(percent(c["shares"][key]) for key, *_ in _PARTS),
         ]
         for c in result["channels"].values()

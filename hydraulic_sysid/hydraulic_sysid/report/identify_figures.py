@@ -14,7 +14,7 @@ Result = dict[str, Any]
 
 
 def overlay(result: Result, part: str, record: int) -> go.Figure:
-    """Measured output, free run and one-step prediction of one record of ``estimation`` or ``validation``."""
+    """Measured output, free run and one-step prediction of one record of ``fit`` or ``test``."""
     traces, settings = result[part]["records"][record]["traces"], result["settings"]
     input_factor, input_unit = style.shown(settings["input"]["unit"])
     factor, unit = style.shown(settings["output"]["unit"])

@@ -28,8 +28,8 @@ def _heading(result: Result) -> str:
     kind = f"Identification · {made_on(result)}"
     ends = f"{settings['input']['channel']} to {settings['output']['channel']}"
     title = f"{first_upper(settings['structure']['text'])} from {ends}"
-    names = ", ".join(r["name"] for r in result["estimation"]["records"])
-    lead = f"{result['estimation']['samples']} samples at {settings['sampling_time'] * 1e3:g} ms from {names}"
+    names = ", ".join(r["name"] for r in result["fit"]["records"])
+    lead = f"{result['fit']['samples']} samples at {settings['sampling_time'] * 1e3:g} ms from {names}"
     verdict = result["verdict"]
     return tag("header", tag("div", kind, "kind") + tag("h1", text(title)) + tag("p", text(lead), "lead"), "top") + tag(
         "div", text(verdict["text"]), f"verdict {text(verdict['level'])}"
@@ -37,7 +37,7 @@ def _heading(result: Result) -> str:
 
 
 def _cards(result: Result) -> str:
-    held, square = result["validation"], _square(result)
+    held, square = result["test"], _square(result)
     mse = f"mse_{result['model']['minimised']}"
     words = "one step" if mse == "mse_one_step" else "free run"
     cards = (
@@ -66,7 +66,7 @@ def _square(result: Result) -> tuple[float, str]:
 
 def _fit(result: Result, place: Figures) -> str:
     options = []
-    for part, word in (("validation", "held out"), ("estimation", "fitted")):
+    for part, word in (("test", "held out"), ("fit", "fitted")):
         for index, record in enumerate(result[part]["records"]):
             tests = place.place(figures.residual_tests(result, part, index))
             note = (
@@ -85,9 +85,9 @@ def _fit(result: Result, place: Figures) -> str:
             text(r["name"]), word, str(r["samples"]), _figure(r["best_fit_free_run"], " %"),
             _figure(r["best_fit_one_step"], " %"), _figure(r["r_squared_free_run"], "", 1.0, 5),
             _figure(r["r_squared_one_step"], "", 1.0, 5), _figure(r["mse_free_run"], "", factor),
-            _figure(r["mse_one_step"], "", factor), quantity(r["noise"], output), _outside(r["residual_tests"]),
+            _figure(r["mse_one_step"], "", factor), quantity(r["noise_std"], output), _outside(r["residual_tests"]),
         ]
-        for part, word in (("validation", "held out"), ("estimation", "fitted"))
+        for part, word in (("test", "held out"), ("fit", "fitted"))
         for r in result[part]["records"]
     ]  # fmt: skip
     head = ["Record", "Data", "Samples", "Best fit, free run", "one step", "R², free run", "one step",
@@ -126,7 +126,7 @@ def _orders(result: Result) -> str:
     if not tried:
         return ""
     factor, unit = _square(result)
-    chosen = result["settings"]["select"]
+    chosen = result["settings"]["criterion"]
     by_choice = sorted(tried, key=lambda row: (row[chosen] is None, row[chosen] or 0.0))
     listed = [row for row in by_choice if row["best_by"]] + [row for row in by_choice if not row["best_by"]]
     rows = [

@@ -23,22 +23,22 @@ _MARGIN = {"l": 66, "r": 14, "t": 52, "b": 44}
 
 def as_maps(result: Result) -> Result:
     """The document's maps in the form of a comparison's, whose figure shows them."""
-    known = [b for b in result["balances"] if b.get("maps")]
+    known = [b for b in result["balances"] if b.get("error_maps")]
     return {
-        "error_maps": {b["name"]: b["maps"] for b in known},
+        "error_maps": {b["name"]: b["error_maps"] for b in known},
         "variables": {
             n: {"unit": unit, "title": TITLES.get(n, n)}
             for n, unit in VARIABLE_UNITS.items()
-            if any(n in b["maps"] for b in known)
+            if any(n in b["error_maps"] for b in known)
         },
         "channels": {b["name"]: {"unit": b["unit"], "title": b["title"]} for b in known},
-        "summary": {b["name"]: {"horizon": {"exact_rmse": b["noise"]}} for b in known},
+        "summary": {b["name"]: {"horizon": {"exact_rmse": b["exact_rms"]}} for b in known},
     }
 
 
 def shares(result: Result, titles: Mapping[str, str]) -> go.Figure:
     """Share of each subsystem in what is missing: in the order of their taking in, and alone."""
-    rows = list(reversed(result["subsystem"]))
+    rows = list(reversed(result["attribution"]))
     names = np.array([titles.get(s["name"], s["name"]) for s in rows])
     panels = Panels(1)
     panels.line(
@@ -67,7 +67,7 @@ def spectra(result: Result) -> go.Figure:
     panels = Panels(rows, columns, gap=(0.08, 0.26), titles=[first_upper(b["title"]) for b in known])
     parts = (
         ("residual", "residual", style.FREE_RUN, "solid", 2.0),
-        ("noise", "an exact model at this noise", style.FLOOR, "dot", 1.6),
+        ("exact", "an exact model at this noise", style.FLOOR, "dot", 1.6),
     )
     for panel, b in enumerate(known):
         factor, unit = style.shown(b["unit"])

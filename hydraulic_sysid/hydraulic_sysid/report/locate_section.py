@@ -61,11 +61,11 @@ def _cards(result: Result) -> str:
     cards = [
         (
             "All balances",
-            f"{number(misfit['parameters_moved'])}<small> × noise²</small>",
+            f"{number(misfit['refitted'])}<small> × noise²</small>",
             f"an exact model: {number(misfit['exact_model'])}; as calibrated: {number(misfit['model'])}",
         )
     ]
-    blamed = result["subsystem"][:3] if result["verdict"]["level"] != "explained" else []
+    blamed = result["attribution"][:3] if result["verdict"]["level"] != "explained" else []
     cards += [
         (
             text(SUBSYSTEMS.get(s["name"], s["name"])),
@@ -88,13 +88,13 @@ def _cards(result: Result) -> str:
 def _balances(result: Result) -> str:
     rows = []
     for b in result["balances"]:
-        over = b.get("over", [])
+        over = b.get("explained_by", [])
         told = ", ".join(f"{o['variable'].replace('_', ' ')} {100.0 * o['explained']:.0f} %" for o in over[:2])
         rows.append(
             [
                 text(first_upper(b["title"])),
                 quantity(b["residual_rms"], b["unit"]),
-                quantity(b["noise"], b["unit"]),
+                quantity(b["exact_rms"], b["unit"]),
                 f"{number(b['ratio'])}×" if b["ratio"] is not None else "–",
                 f"below {number(b['band'][1])} Hz",
                 text(told or "–"),
@@ -124,7 +124,7 @@ def _findings(result: Result) -> str:
     return section("In words", "", tag("ul", items, "findings")) if items else ""
 
 
-_TONES = {"violated": "above_floor", "at_noise": "at_floor", "blame": "depends_on", "not_formed": "drift"}
+_TONES = {"violated": "above_noise", "at_noise": "at_noise", "attribution": "depends_on", "not_formed": "drift"}
 
 
 def _maps(result: Result, place: Figures) -> str:
@@ -132,7 +132,7 @@ def _maps(result: Result, place: Figures) -> str:
     options = [
         (first_upper(b["title"]), place.place(compare_figures.error_maps(shown, b["name"])))
         for b in result["balances"]
-        if b.get("maps")
+        if b.get("error_maps")
     ]
     if not options:
         return ""
@@ -163,7 +163,7 @@ def _whiteness(result: Result, place: Figures) -> str:
 
 def _method(result: Result) -> str:
     settings = result["settings"]
-    moved = ", ".join(settings["parameters_moved"]) or "none"
+    moved = ", ".join(settings["refitted_parameters"]) or "none"
     facts = {
         "Balances": "the model is started anew from the measured state every few samples; what it gives there is "
         "set against measured motion and pressure rates",

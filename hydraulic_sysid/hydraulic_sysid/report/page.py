@@ -32,18 +32,18 @@ Result = dict[str, Any]
 # A result's schema chooses how it is shown; a new kind of result adds its section here.
 SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
     "hydraulic_sysid.add/2": diagnose_section.html,
-    "hydraulic_sysid.bandwidth/1": bandwidth_section.html,
+    "hydraulic_sysid.bandwidth/2": bandwidth_section.html,
     "hydraulic_sysid.calibrate/2": calibrate_section.html,
-    "hydraulic_sysid.compare/1": compare_section.html,
+    "hydraulic_sysid.compare/2": compare_section.html,
     "hydraulic_sysid.design/1": design_section.html,
     "hydraulic_sysid.diagnose/2": diagnose_section.html,
-    "hydraulic_sysid.frequency_response/1": frequency_response_section.html,
-    "hydraulic_sysid.greybox/1": greybox_section.html,
-    "hydraulic_sysid.identify/2": identify_section.html,
-    "hydraulic_sysid.locate/1": locate_section.html,
+    "hydraulic_sysid.frequency_response/2": frequency_response_section.html,
+    "hydraulic_sysid.greybox/2": greybox_section.html,
+    "hydraulic_sysid.identify/3": identify_section.html,
+    "hydraulic_sysid.locate/2": locate_section.html,
     "hydraulic_sysid.next_experiment/2": next_experiment_section.html,
-    "hydraulic_sysid.paper/1": paper_section.html,
-    "hydraulic_sysid.validate/1": validate_section.html,
+    "hydraulic_sysid.paper/2": paper_section.html,
+    "hydraulic_sysid.validate/2": validate_section.html,
 }
 
 

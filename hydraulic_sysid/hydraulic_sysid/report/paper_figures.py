@@ -28,7 +28,7 @@ def data(excitation: dict[str, Any]) -> go.Figure:
         panels.y_axis(panel, title, nticks=5)
         panels.shapes.append(
             {"type": "rect", "xref": "x", "yref": f"y{panel + 1 if panel else ''} domain", "y0": 0, "y1": 1,
-             "x0": excitation["held_out_from"], "x1": excitation["duration"], "fillcolor": style.FLOOR_BAND,
+             "x0": excitation["test_from"], "x1": excitation["duration"], "fillcolor": style.FLOOR_BAND,
              "line": {"width": 0}, "layer": "below"}
         )  # fmt: skip
     panels.x_axis(0, "time [s]", anchor="y2", mirror="all")

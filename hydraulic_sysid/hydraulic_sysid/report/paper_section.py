@@ -143,13 +143,13 @@ def _grid(result: Result, place: Figures) -> str:
             text(c["shape"]),
             number(c["amplitude"]),
             number(c["frequency"]),
-            quantity(c["spread"], "m"),
+            quantity(c["std"], "m"),
             *(_mm(c["models"][n]["rmse"]) for n in names),
         ]
         for c in result["grid"]
     ]
     rows += [
-        [text(r["name"].replace("validation_", "recorded ")), "", "", quantity(r["spread"], "m")]
+        [text(r["name"].replace("validation_", "recorded ")), "", "", quantity(r["std"], "m")]
         + [_mm(r["models"][n]["rmse"]) if n in r["models"] else "" for n in names]
         for r in result["recorded"]
     ]

@@ -67,7 +67,7 @@ def _grid(result: Result, place: Figures) -> str:
     factor, unit = style.shown(result["settings"]["output"]["unit"])
     rows = [
         [
-            c["shape"], f"{c['amplitude']:g} V", f"{c['frequency']:g} Hz", f"{c['spread'] * factor:.3g}",
+            c["shape"], f"{c['amplitude']:g} V", f"{c['frequency']:g} Hz", f"{c['std'] * factor:.3g}",
             *(_error(c["models"][n], factor) for n in names), "" if c["within_travel"] else "*",
         ]
         for c in result["grid"]

@@ -60,7 +60,7 @@ def _bandwidth(options: argparse.Namespace) -> int:
         model = load_model(options.model)
         source = {"kind": "model", "name": model.name, "path": str(model.path or "")}
         if options.probe:
-            source["kind"] = "rehearsal"
+            source["kind"] = "simulation"
             found, coherence = bandwidth.from_rehearsal(model, load_plan(options.probe))
         else:
             found = bandwidth.from_model(model, options.position)

@@ -123,7 +123,8 @@ def _print(result: dict[str, Any], console: Console) -> None:
         row(record["name"], [record["channels"].get(n, {}).get("horizon") for n in channels])
     table.add_section()
     row("all", [result["summary"][n]["horizon"] for n in channels], style="bold")
-    table.add_row("noise", *(quantity(result["summary"][n]["noise"], result["channels"][n]["unit"]) for n in channels))
+    noise = ((result["summary"][n]["noise_std"], result["channels"][n]["unit"]) for n in channels)
+    table.add_row("noise", *(quantity(size, unit) for size, unit in noise))
     console.print(table)
     console.print(result["verdict"]["text"])
     for finding in [f for f in result["findings"] if f["kind"] in ("bias", "depends_on")][:_LISTED]:

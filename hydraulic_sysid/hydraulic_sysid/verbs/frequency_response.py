@@ -70,11 +70,11 @@ def _respond(options: argparse.Namespace) -> int:
 
 
 def _print(result: dict[str, Any], console: Console) -> None:
-    if result["levels"] is not None:
+    if result["levels_db"] is not None:
         table = Table(title="level of the output beside its linear part", title_justify="left")
         table.add_column("")
         table.add_column("dB", justify="right")
-        for name, value in result["levels"].items():
+        for name, value in result["levels_db"].items():
             table.add_row(name.replace("_", " "), "below the noise" if value is None else number(value))
         console.print(table)
     console.print(result["verdict"]["text"])

@@ -81,7 +81,7 @@ def _print(result: dict[str, Any], console: Console) -> None:
     for head in ("channel", "white box", "+ linear", "+ nonlinear", "exact model", "not named", "neither"):
         table.add_column(head, justify="left" if head == "channel" else "right")
     for channel in result["channels"].values():
-        side, part = channel["held_out"], channel["shares"]
+        side, part = channel["test"], channel["shares"]
         table.add_row(
             first_upper(channel["title"]),
             *(quantity(side[key], channel["unit"]) for key in ("white", "linear", "grey", "exact")),

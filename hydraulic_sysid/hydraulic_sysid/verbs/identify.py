@@ -135,7 +135,7 @@ def _print(result: dict[str, Any], console: Console) -> None:
     for title in ("record", "data", "samples", "free run", "one step", f"MSE, one step, {unit}²"):
         left = title in ("record", "data")
         table.add_column(title, justify="left" if left else "right", no_wrap=left)
-    for part, word in (("validation", "held out"), ("estimation", "fitted")):
+    for part, word in (("test", "held out"), ("fit", "fitted")):
         for r in result[part]["records"]:
             table.add_row(
                 r["name"], word, str(r["samples"]), _fit(r["best_fit_free_run"]), _fit(r["best_fit_one_step"]),
@@ -145,9 +145,9 @@ def _print(result: dict[str, Any], console: Console) -> None:
     console.print(table)
     console.print(result["verdict"]["text"])
     if result["orders"]:
-        console.print(f"{result['settings']['select'].upper()} chose it among {len(result['orders'])} orders")
+        console.print(f"{result['settings']['criterion'].upper()} chose it among {len(result['orders'])} orders")
     console.print(
-        f"final prediction error {number(result['validation']['fpe'] * factor**2)} {unit}² "
+        f"final prediction error {number(result['test']['fpe'] * factor**2)} {unit}² "
         "(what is expected on fresh data)"
     )
     poles = ", ".join(_pole(p) for p in result["model"]["poles"])

@@ -27,7 +27,7 @@ EPILOG = """\
 examples:
   python -m hydraulic_sysid locate --model runs/calibrated/model.yaml --record examples/sample_bench --out runs/located
 """
-_BULKY = ("maps", "spectrum", "lag", "cross_lag", "autocorrelation", "exact_autocorrelation", "cross_correlation")
+_BULKY = ("error_maps", "spectrum", "lag", "cross_lag", "autocorrelation", "exact_autocorrelation", "cross_correlation")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -68,7 +68,7 @@ def _print(result: dict[str, Any], console: Console) -> None:
         table.add_row(
             first_upper(b["title"]),
             quantity(b["residual_rms"], b["unit"]),
-            quantity(b["noise"], b["unit"]),
+            quantity(b["exact_rms"], b["unit"]),
             f"{number(b['ratio'])}×",
             f"below {number(b['band'][1])} Hz",
         )
@@ -77,9 +77,9 @@ def _print(result: dict[str, Any], console: Console) -> None:
     table = Table(title="what each subsystem explains of what is missing", title_justify="left")
     for title in ("subsystem", "share", "alone"):
         table.add_column(title, justify="left" if title == "subsystem" else "right")
-    for s in result["subsystem"]:
+    for s in result["attribution"]:
         table.add_row(s["name"], percent(s["share"]), percent(s["alone"]))
-    if result["subsystem"]:
+    if result["attribution"]:
         console.print(table)
     console.print(result["verdict"]["text"])
     for finding in result["findings"]:

@@ -75,7 +75,7 @@ def compare(
     summary = {name: _pooled(documents, name) for name in channels}
     found = _findings(documents, summary, maps, settings)
     return {
-        **heading("compare"),
+        **heading("compare", 2),
         "model": model_document(model),
         "settings": {
             "horizon": settings.horizon,
@@ -152,10 +152,10 @@ def _pooled(documents: Sequence[dict[str, Any]], channel: str) -> dict[str, Any]
     def pool(values: list[float]) -> float:
         return float(np.sqrt(np.average(np.square(values), weights=samples)))
 
-    pooled: dict[str, Any] = {"noise": pool([p["noise"] for _, p in parts])}
+    pooled: dict[str, Any] = {"noise_std": pool([p["noise_std"] for _, p in parts])}
     for mode in MODES:
         rmse = pool([p[mode]["rmse"] for _, p in parts])
-        spread = pool([p[mode]["spread"] for _, p in parts])
+        spread = pool([p[mode]["std"] for _, p in parts])
         exact = pool([p[mode]["exact_rmse"] for _, p in parts])
         pooled[mode] = {
             "rmse": rmse,
@@ -178,9 +178,10 @@ def _findings(
     found: list[Finding] = []
     for channel, figures in summary.items():
         unit, at = UNITS[channel], figures["horizon"]
-        size = findings.size_finding(channel, unit, at["rmse"], at["exact_rmse"], figures["noise"], settings.horizon)
+        noise_std = figures["noise_std"]
+        size = findings.size_finding(channel, unit, at["rmse"], at["exact_rmse"], noise_std, settings.horizon)
         found.append(size)
-        if size.kind == "at_floor":
+        if size.kind == "at_noise":
             continue
         constant = findings.bias_finding(channel, unit, at["bias"], at["rmse"])
         found += [constant] if constant is not None else []
@@ -202,7 +203,7 @@ def _findings(
             free["drift"], free["rmse_detrended"], free["rmse"], document["name"], document["duration"]
         )
         found += [drift] if drift is not None else []
-    order = {"above_floor": 0, "at_floor": 0, "bias": 1, "depends_on": 1, "amplitude": 2, "frequency": 3, "drift": 4}
+    order = {"above_noise": 0, "at_noise": 0, "bias": 1, "depends_on": 1, "amplitude": 2, "frequency": 3, "drift": 4}
     return sorted(found, key=lambda f: (order[f.kind], -f.weight))
 
 

@@ -31,10 +31,10 @@ def record_document(c: Compared, trace_points: int) -> dict[str, Any]:
         "drive": trace(record.time, record["drive"], trace_points),
         "traces": {},
         "spectra": {},
-        "error_growth": {"lead": c.runs.growth_lead},
+        "error_growth": {"lead_time": c.runs.growth_lead},
     }
     for name in data.compared:
-        document["channels"][name] = {"noise": data.noise[name], **{mode: figures(c, mode, name) for mode in MODES}}
+        document["channels"][name] = {"noise_std": data.noise[name], **{mode: figures(c, mode, name) for mode in MODES}}
         document["traces"][name] = _traces(c, name, trace_points)
         document["spectra"][name] = _spectra(c, name)
         document["error_growth"][name] = {"rms": c.runs.growth_rms[name], "exact_rms": c.twin_runs.growth_rms[name]}
@@ -53,7 +53,7 @@ def figures(c: Compared, mode: str, channel: str) -> dict[str, float]:
         "nrmse": float(np.linalg.norm(error)) / spread if spread > 0.0 else float("nan"),
         "bias": float(error.mean()),
         "largest": float(np.abs(error).max()),
-        "spread": spread / np.sqrt(y.size),
+        "std": spread / np.sqrt(y.size),
         "samples": int(y.size),
     }
     if mode == "free_run":

@@ -39,7 +39,7 @@ class ErrorMap:
     rms: Array
     explained: float
     """Cross-validated share of the error's variance that the bin means explain; NaN if it cannot be tried."""
-    chance: float
+    chance_level: float
     """What that share may reach by chance, given how few independent samples a slow error has."""
 
     def as_dict(self) -> dict[str, object]:
@@ -140,7 +140,7 @@ def error_map(error: Array, binning: Binning, folds: NDArray[np.int64], independ
         high=table[:, 5],
         rms=table[:, 6],
         explained=share,
-        chance=min(1.0, _CHANCE / max(independent, 1.0)),
+        chance_level=min(1.0, _CHANCE / max(independent, 1.0)),
     )
 
 

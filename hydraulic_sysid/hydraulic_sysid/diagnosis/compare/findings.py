@@ -46,18 +46,18 @@ def size_finding(channel: str, unit: str, rmse: float, exact: float, noise: floa
     """How large the error is beside what an exact model would show."""
     ratio = rmse / exact if exact > 0.0 else float("inf")
     title = first_upper(TITLES[channel])
-    numbers = {"rmse": rmse, "exact_rmse": exact, "noise": noise, "ratio": ratio}
+    numbers = {"rmse": rmse, "exact_rmse": exact, "noise_std": noise, "ratio": ratio}
     if ratio <= AT_FLOOR:
         text = (
             f"{title} is explained to within the measurement noise: error {quantity(rmse, unit)} RMS "
             f"{horizon:g} s ahead, where an exact model would show {quantity(exact, unit)}."
         )
-        return Finding(channel, "at_floor", text, 0.0, numbers)
+        return Finding(channel, "at_noise", text, 0.0, numbers)
     text = (
         f"{title} is missed by {quantity(rmse, unit)} RMS {horizon:g} s ahead, {number(ratio)} times the "
         f"{quantity(exact, unit)} that an exact model would show at this noise."
     )
-    return Finding(channel, "above_floor", text, ratio, numbers)
+    return Finding(channel, "above_noise", text, ratio, numbers)
 
 
 def bias_finding(channel: str, unit: str, bias: float, rmse: float) -> Finding | None:
@@ -74,7 +74,7 @@ def bias_finding(channel: str, unit: str, bias: float, rmse: float) -> Finding |
 
 def map_finding(channel: str, unit: str, variable: str, variable_unit: str, m: ErrorMap) -> Finding | None:
     """What the error looks like over one variable, or None if the variable explains too little to say."""
-    if not m.explained >= max(WORTH_SAYING, m.chance) or m.center.size < 2:
+    if not m.explained >= max(WORTH_SAYING, m.chance_level) or m.center.size < 2:
         return None
     if is_own(channel, variable):
         return _own_finding(channel, unit, variable, m)

@@ -82,14 +82,14 @@ def grey_box(
     channels = [name for name in TARGETS if all(name in p.error for p in parts)]
     found = {name: _channel(name, fitted, tried, candidates) for name in channels}
     return {
-        **heading("greybox"),
+        **heading("greybox", 2),
         "title": f"Grey box on {model.name}",
         "model": {"name": model.name, "path": str(model.path) if model.path else None, "effects": list(model.effects)},
-        "settings": {"horizon": horizon, "step": STEP_S, "candidates": len(candidates[0].names)},
+        "settings": {"horizon": horizon, "sampling_time": STEP_S, "candidates": len(candidates[0].names)},
         "verdict": verdict(model.name, found),
         "channels": found,
-        "fitted": [p.name for p in fitted],
-        "held_out": [p.name for p in tried],
+        "fit": [p.name for p in fitted],
+        "test": [p.name for p in tried],
     }
 
 
@@ -133,14 +133,14 @@ def _channel(name: str, fitted: Sequence[_Part], tried: Sequence[_Part], candida
     if only_linear.cross_validated < full.cross_validated:
         full = only_linear
     sides = {
-        "fitted": _side(name, fitted, known, only_linear, full),
-        "held_out": _side(name, tried, fresh, only_linear, full),
+        "fit": _side(name, fitted, known, only_linear, full),
+        "test": _side(name, tried, fresh, only_linear, full),
     }
     return {
         "unit": UNITS[name],
         "title": TITLES[name],
         **sides,
-        "shares": shares(sides["held_out"]),
+        "shares": shares(sides["test"]),
         "terms": _contributions(name, tried, fresh, full),
         "records": [
             {

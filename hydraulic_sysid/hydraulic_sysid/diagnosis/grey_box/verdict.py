@@ -30,10 +30,10 @@ def shares(side: Mapping[str, float]) -> dict[str, float]:
 def verdict(name: str, channels: Mapping[str, Any]) -> dict[str, str]:
     """How much is left that the physics of the model does not name."""
     key = next(iter(channels))
-    side, part = channels[key]["held_out"], channels[key]["shares"]
+    side, part = channels[key]["test"], channels[key]["shares"]
     unit, title = channels[key]["unit"], channels[key]["title"]
     left = f"{name} misses {quantity(side['white'], unit)} of the {title} on held-out data"
-    if all(c["held_out"]["white"] ** 2 <= _NOISE_ONLY * c["held_out"]["exact"] ** 2 for c in channels.values()):
+    if all(c["test"]["white"] ** 2 <= _NOISE_ONLY * c["test"]["exact"] ** 2 for c in channels.values()):
         return {"level": "explained", "text": f"{left}, no more than noise explains: the physics names all there is."}
     unnamed = part["linear"] + part["nonlinear"]
     text = (

@@ -68,13 +68,13 @@ def locate(
             verdict = judge(balances, studies, keys, lines, pool)
     entries = figures.balances(studies, names, maps) if studies else []
     result: dict[str, Any] = {
-        **heading("locate"),
+        **heading("locate", 2),
         "model": model_document(model),
         "settings": {
             "rate": studies[0].rate if studies else RATE,
             "whitening_order": ORDER,
-            "parameters_moved": keys,
-            "lines_hz": lines,
+            "refitted_parameters": keys,
+            "spectral_lines": lines,
         },
         "records": [
             {"name": r.name, "source": str(r.source), "duration": r.duration, "samples": len(r)} for r in records
@@ -82,7 +82,7 @@ def locate(
         "not_formed": not_formed(model, records, names),
         "balances": entries,
         "misfit": figures.misfit(verdict),
-        "subsystem": figures.subsystems(verdict),
+        "attribution": figures.subsystems(verdict),
         "whiteness": figures.whiteness(studies, names) if maps and studies else {},
     }
     result["findings"] = words.findings(result)

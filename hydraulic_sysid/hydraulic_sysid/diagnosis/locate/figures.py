@@ -101,18 +101,18 @@ def _entry(name: str, series: Sequence[_Series], studies: Sequence[Study], maps:
         "unit": UNITS.get(name, {"valve": "1", "continuity": "m/s"}.get(name, "1")),
         "band": [0.0, band],
         "residual_rms": size,
-        "noise": floor,
+        "exact_rms": floor,
         "ratio": size / floor if floor > 0.0 else float("inf"),
         "bias": float(np.mean(np.concatenate([s.measured for s in smooth]))),
         "records": [
-            {"name": s.data.record.name, "residual_rms": _rms([x.measured]), "noise": _rms([x.twin])}
+            {"name": s.data.record.name, "residual_rms": _rms([x.measured]), "exact_rms": _rms([x.twin])}
             for s, x in zip(studies, smooth, strict=True)
         ],
     }
     if maps:
-        entry["spectrum"] = {"frequency": frequency, "residual": np.sqrt(residual), "noise": np.sqrt(noise)}
-        entry["maps"] = _maps([x.measured for x in smooth], studies)
-        entry["over"] = _over(entry["maps"])
+        entry["spectrum"] = {"frequency": frequency, "residual": np.sqrt(residual), "exact": np.sqrt(noise)}
+        entry["error_maps"] = _maps([x.measured for x in smooth], studies)
+        entry["explained_by"] = _over(entry["error_maps"])
     return entry
 
 
@@ -194,7 +194,7 @@ def _over(maps: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
     told: list[dict[str, Any]] = [
         {"variable": name, "explained": float(m["explained"])}
         for name, m in maps.items()
-        if m["explained"] > max(WORTH_SAYING, m["chance"])
+        if m["explained"] > max(WORTH_SAYING, m["chance_level"])
     ]
     return sorted(told, key=lambda row: -float(row["explained"]))
 
@@ -205,8 +205,8 @@ def misfit(verdict: Verdict | None) -> dict[str, Any] | None:
         return None
     return {
         "model": verdict.before,
-        "parameters_moved": verdict.refitted,
-        "explained": verdict.left,
+        "refitted": verdict.refitted,
+        "attributed": verdict.left,
         "exact_model": verdict.exact,
         "samples": int(verdict.count),
     }
@@ -222,9 +222,9 @@ def subsystems(verdict: Verdict | None) -> list[dict[str, Any]]:
             "name": b.subsystem,
             "share": b.share,
             "alone": b.alone,
-            "gain": b.gain,
-            "over": b.variables,
-            "tied": b.alone >= best - _TIED,
+            "reduction": b.gain,
+            "variables": b.variables,
+            "indistinguishable": b.alone >= best - _TIED,
         }
         for b in verdict.ranked
     ]

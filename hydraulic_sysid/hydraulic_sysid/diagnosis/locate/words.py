@@ -35,31 +35,31 @@ def findings(result: dict[str, Any]) -> list[dict[str, Any]]:
     """Sentences: violated balances, the strongest first, then the subsystems that explain them."""
     found = []
     for b in sorted(result["balances"], key=lambda b: -b["ratio"]):
-        size, noise = quantity(b["residual_rms"], b["unit"]), quantity(b["noise"], b["unit"])
+        size, noise = quantity(b["residual_rms"], b["unit"]), quantity(b["exact_rms"], b["unit"])
         text = f"{first_upper(b['title'])}: {size} RMS below {number(b['band'][1])} Hz"
-        numbers = {"residual_rms": b["residual_rms"], "noise": b["noise"], "ratio": b["ratio"]}
+        numbers = {"residual_rms": b["residual_rms"], "exact_rms": b["exact_rms"], "ratio": b["ratio"]}
         if b["ratio"] <= _VIOLATED:
             text += f", which is its noise ({noise})."
             found.append({"balance": b["name"], "kind": "at_noise", "text": text, "numbers": numbers})
             continue
         text += f", {number(b['ratio'])} times its noise of {noise}"
-        over = b.get("over", [])
+        over = b.get("explained_by", [])
         if over:
             share = 100.0 * float(over[0]["explained"])
             text += f"; {OVER.get(over[0]['variable'], over[0]['variable'])} alone explains {share:.0f} % of it"
-            numbers |= {"over": over[0]["variable"], "explained": over[0]["explained"]}
+            numbers |= {"variable": over[0]["variable"], "explained": over[0]["explained"]}
         found.append({"balance": b["name"], "kind": "violated", "text": text + ".", "numbers": numbers})
-    for s in result["subsystem"]:
+    for s in result["attribution"]:
         if s["share"] < _WORTH or _over(result) <= EXPLAINED:
             continue
-        best = next(iter(s["over"]), None)
+        best = next(iter(s["variables"]), None)
         text = (
             f"{first_upper(PLACES[s['name']])}: {100.0 * s['share']:.0f} % of what the model lacks in its balances"
             f" ({100.0 * s['alone']:.0f} % if nothing else is blamed)"
         )
         text += f", mostly over {OVER.get(best, best)}." if best else "."
         numbers = {"share": s["share"], "alone": s["alone"]}
-        found.append({"balance": None, "kind": "blame", "subsystem": s["name"], "text": text, "numbers": numbers})
+        found.append({"balance": None, "kind": "attribution", "subsystem": s["name"], "text": text, "numbers": numbers})
     for missing in (m for m in result["not_formed"] if m["name"] in _BASIC):
         text = f"The {missing['name'].replace('_', ' ')} balance cannot be formed: {missing['why']}."
         found.append({"balance": missing["name"], "kind": "not_formed", "text": text, "numbers": {}})
@@ -81,19 +81,19 @@ def verdict(result: dict[str, Any]) -> dict[str, str]:
             "level": "explained",
             "text": f"All balances hold to within their noise: mean square {number(over)} times an exact model's.",
         }
-    blamed = [s for s in result["subsystem"] if s["share"] >= _WORTH]
+    blamed = [s for s in result["attribution"] if s["share"] >= _WORTH]
     level = "close" if over <= CLOSE else "off"
     text = f"The balances miss {number(over)} times the mean square that noise explains"
     if not blamed:
         return {"level": level, "text": text + "; no subsystem explains it."}
     parts = [f"{PLACES[s['name']]} ({100.0 * s['share']:.0f} %)" for s in blamed]
     text = f"{text}. It belongs to {' and '.join(parts[:3])}."
-    tied = [PLACES[s["name"]] for s in result["subsystem"] if s["tied"] and s is not blamed[0]]
-    if tied and blamed[0]["tied"]:
+    tied = [PLACES[s["name"]] for s in result["attribution"] if s["indistinguishable"] and s is not blamed[0]]
+    if tied and blamed[0]["indistinguishable"]:
         text += f" These records hardly tell that from {' or '.join(tied)}."
     return {"level": level, "text": text}
 
 
 def _over(result: dict[str, Any]) -> float:
     """Mean square of the balances, parameters moved, over that of an exact model."""
-    return float(result["misfit"]["parameters_moved"] / result["misfit"]["exact_model"])
+    return float(result["misfit"]["refitted"] / result["misfit"]["exact_model"])

@@ -104,7 +104,7 @@ def _balances(model: Model, records: Sequence[Record], blame: bool) -> tuple[lis
         found = locate(model, records, maps=False)
     except (LocateError, SimulationError):
         return [], []
-    return found["balances"], [str(s["name"]) for s in found["subsystem"]]
+    return found["balances"], [str(s["name"]) for s in found["attribution"]]
 
 
 def finished(found: Found, known: Mapping[str, Known], records: Sequence[Record], held_out: Sequence[Record]) -> Model:

@@ -246,5 +246,5 @@ def _shape(s: Shape) -> dict[str, Any]:
 
 def _balances(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> list[dict[str, Any]]:
     later = {b["name"]: b["ratio"] for b in after}
-    keys = ("name", "subsystem", "unit", "residual_rms", "noise", "ratio")
+    keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
     return [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]

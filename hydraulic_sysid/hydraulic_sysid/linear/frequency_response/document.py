@@ -59,14 +59,14 @@ def respond(records: Sequence[Record], settings: Settings | None = None) -> dict
     method = ("bla" if periodic else "welch") if settings.method == "auto" else settings.method
     if method == "welch" and len(records) > 1:
         raise FrequencyResponseError(f"{len(records)} records: without periods one record is taken at a time")
-    content: dict[str, Any] = {"lines": None, "odd_lines": None, "even_lines": None, "levels": None}
+    content: dict[str, Any] = {"lines": None, "odd_lines": None, "even_lines": None, "levels_db": None}
     if method == "bla":
         cut = [periods_of(r, settings.output, settings.input, settings.period, settings.start) for r in records]
         content |= _periodic(cut, settings.output == "position")
     content |= _spectral(records[0], settings)
     text, level = _verdict(content, method)
     return {
-        **heading("frequency_response"),
+        **heading("frequency_response", 2),
         "verdict": {"level": level, "text": text},
         "title": f"Frequency response of {records[0].name}",
         "model": {"name": ", ".join(r.name for r in records)},
@@ -100,24 +100,24 @@ def _periodic(cut: Sequence[Periods], integrating: bool) -> dict[str, Any]:
         "lines": {
             "frequency": found.frequency,
             **_curve(found.response),
-            "noise": found.noise,
-            "total": found.total,
+            "noise_std": found.noise,
+            "total_std": found.total,
             "distortion": found.distortion,
             "coherence": found.coherence,
             "output": found.output,
-            "output_noise": found.output_noise,
+            "output_noise_std": found.output_noise,
         },
         "odd_lines": _lines(found.odd),
         "even_lines": _lines(found.even),
-        "levels": levels,
-        "linear_share": _linear_share(found, levels),
+        "levels_db": levels,
+        "linear_fit_limit": _linear_fit_limit(found, levels),
     }
 
 
 def _lines(lines: Lines | None) -> dict[str, Any] | None:
     if lines is None:
         return None
-    return {"frequency": lines.frequency, "amplitude": lines.amplitude, "noise": lines.noise}
+    return {"frequency": lines.frequency, "amplitude": lines.amplitude, "noise_std": lines.noise}
 
 
 def _curve(response: NDArray[np.complex128]) -> dict[str, Any]:
@@ -145,7 +145,7 @@ def _ratio(power: Array, reference: Array, weight: Array) -> float | None:
     return 10.0 * float(np.log10(share)) if share > 0.0 else None
 
 
-def _linear_share(found: BestLinearApproximation, levels: dict[str, float | None]) -> float | None:
+def _linear_fit_limit(found: BestLinearApproximation, levels: dict[str, float | None]) -> float | None:
     """Best fit [%] that a linear model can reach on the played lines and those beside them: what of the output's
     amplitude is neither distortion nor noise. None where distortion was not told."""
     played = float(np.sum(found.output**2))
@@ -183,7 +183,7 @@ def _estimate(found: Spectral) -> dict[str, Any]:
         "frequency": found.frequency[keep],
         **_curve(found.response[keep]),
         "coherence": found.coherence[keep],
-        "deviation": found.deviation[keep],
+        "std": found.deviation[keep],
     }
 
 
@@ -195,7 +195,7 @@ def _verdict(content: dict[str, Any], method: str) -> tuple[str, str]:
         f = np.asarray(content["welch"]["frequency"])[trusted]
         text = f"Coherence of 0.9 and more from {number(f.min())} to {number(f.max())} Hz"
         return f"{text}. Noise and distortion lower it alike; a multisine of whole periods tells them apart.", "close"
-    levels = content["levels"]
+    levels = content["levels_db"]
     parts = [
         f"{word} distortion {_words(levels[key])}"
         for key, word in (("odd_distortion", "odd"), ("even_distortion", "even"))
@@ -206,8 +206,8 @@ def _verdict(content: dict[str, Any], method: str) -> tuple[str, str]:
     parts.append(f"noise {_words(levels['noise'])}")
     known = [v for k, v in levels.items() if k != "noise" and v is not None]
     text = f"At {number(content['drive_rms'])} V effective: {', '.join(parts)} (relative to the linear response)."
-    if content["linear_share"] is not None:
-        text += f" No linear model can fit this output to better than {content['linear_share']:.2f} %."
+    if content["linear_fit_limit"] is not None:
+        text += f" No linear model can fit this output to better than {content['linear_fit_limit']:.2f} %."
     elif len(parts) == 1:
         text += " Distortion is not told apart: play an odd multisine, or several realisations."
     worst = max(known, default=-np.inf)

@@ -20,7 +20,8 @@ from .model import LinearModel
 from .state_space import StateSpaceModel
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
 
-FORMAT = "hydraulic-linear-model-1"
+FORMAT = "hydraulic-linear-model-2"
+_READABLE = (FORMAT, "hydraulic-linear-model-1")  # whose figures on test data stand under another key
 _KINDS: dict[type, str] = {
     ArxModel: "arx",
     TransferFunctionModel: "transfer function",
@@ -92,7 +93,7 @@ def read_document(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise IdentificationError(f"{path}: not a JSON document ({error})") from error
     found = content.get("format") if isinstance(content, dict) else None
-    if found != FORMAT:
+    if found not in _READABLE:
         raise IdentificationError(f"{path}: format is {found!r}, expected {FORMAT!r}")
     return dict(content)
 

@@ -38,7 +38,7 @@ def residual_tests(residual: Array, drive: Array, lags: int = LAGS) -> dict[str,
     cross_bound = bound * float(np.sqrt(_inflation(residual, drive)))
     return {
         "lags": lags,
-        "level": LEVEL,
+        "confidence": LEVEL,
         "bound": bound,
         "cross_bound": cross_bound,
         "autocorrelation": own,

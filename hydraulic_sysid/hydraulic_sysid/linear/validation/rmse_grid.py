@@ -64,7 +64,7 @@ def periodic(shape: str, amplitude: float, frequency: float, duration: float, dt
 def rmse_grid(models: Mapping[str, LinearModel], plant: Plant, grid: Grid, dt: float = 1e-3) -> list[dict[str, Any]]:
     """One entry per drive: what it was, whether the plant stayed off its stops, and the errors of every model.
 
-    ``shape``, ``amplitude`` [V], ``frequency`` [Hz], ``duration`` [s], ``spread`` (standard deviation of the plant's
+    ``shape``, ``amplitude`` [V], ``frequency`` [Hz], ``duration`` [s], ``std`` (standard deviation of the plant's
     position [m]), ``within_travel``, and ``models``: name → ``rmse`` [m], ``best_fit`` [%] (NaN for an unstable
     model). The plant starts at rest, where the drive's mean motion is centred in the stroke.
     """
@@ -82,7 +82,7 @@ def rmse_grid(models: Mapping[str, LinearModel], plant: Plant, grid: Grid, dt: f
                         "amplitude": float(amplitude),
                         "frequency": float(frequency),
                         "duration": duration,
-                        "spread": float(np.std(position)),
+                        "std": float(np.std(position)),
                         "within_travel": inside,
                         "models": {name: errors(model, drive, position, dt) for name, model in models.items()},
                     }
@@ -96,12 +96,12 @@ def records_rmse(
     input_channel: str = "drive",
     output_channel: str = "position",
 ) -> list[dict[str, Any]]:
-    """The same over measured records: ``name``, ``duration``, ``spread`` and ``models`` as of `rmse_grid`."""
+    """The same over measured records: ``name``, ``duration``, ``std`` and ``models`` as of `rmse_grid`."""
     return [
         {
             "name": record.name,
             "duration": record.duration,
-            "spread": float(np.std(record[output_channel])),
+            "std": float(np.std(record[output_channel])),
             "models": {
                 name: errors(model, record[input_channel], record[output_channel], record.dt)
                 for name, model in models.items()

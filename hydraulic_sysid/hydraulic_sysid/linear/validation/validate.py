@@ -59,7 +59,7 @@ def validate(
         for name, model in models.items():
             row["models"][name] |= _one_step(model, record, first)
     return {
-        **heading("validate"),
+        **heading("validate", 2),
         "title": "Validation of identified models",
         "models": [
             {"name": name, "source": s.source, "sampling_time": s.model.dt, "stable": _stable(s.model)}

@@ -26,7 +26,7 @@ def models_table(found: Sequence[study.Identified]) -> list[dict[str, Any]]:
     for one in found:
         if one.excitation.band != "in":
             continue
-        kind, estimation, held = one.excitation.kind, one.document["estimation"], one.document["validation"]
+        kind, estimation, held = one.excitation.kind, one.document["fit"], one.document["test"]
         fit = held["best_fit_free_run"]
         rows.append(
             {
@@ -65,7 +65,7 @@ def thesis_table(found: Sequence[study.Identified], cells: Sequence[Mapping[str,
                 "excitation": kind,
                 "band": one.excitation.band,
                 "band_over_bandwidth": [low, high],
-                "best_fit_own": one.document["validation"]["best_fit_free_run"],
+                "best_fit_own": one.document["test"]["best_fit_free_run"],
                 "best_fit_in_band": common["best_fit"],
                 "rmse": float(np.sqrt(np.mean(squares))),
             }
@@ -123,7 +123,7 @@ def document(
     table, thesis = models_table(found), thesis_table(found, cells)
     result = holds(thesis)
     return {
-        **heading("paper"),
+        **heading("paper", 2),
         "title": f"The paper's study on {model_name}",
         "verdict": _verdict(table, result),
         "model": {"name": model_name},
@@ -156,7 +156,7 @@ def _bandwidth(found: Bandwidth) -> dict[str, float]:
 
 
 def _excitation(one: study.Identified, record: Record, origins: Mapping[str, str]) -> dict[str, Any]:
-    plan, (held,) = one.excitation.plan, one.document["validation"]["records"]
+    plan, (held,) = one.excitation.plan, one.document["test"]["records"]
     assert plan.prediction is not None
     whole = study.played(one.excitation, record)
     return {
@@ -168,7 +168,7 @@ def _excitation(one: study.Identified, record: Record, origins: Mapping[str, str
         "prediction": plan.prediction.as_mapping(),
         "duration": whole.duration,
         "poles": one.document["model"]["poles"],
-        "held_out_from": whole.duration - one.held_out.duration,
+        "test_from": whole.duration - one.held_out.duration,
         "traces": {
             "drive": trace(whole.time, whole["drive"]),
             "position": trace(whole.time, whole["position"]),

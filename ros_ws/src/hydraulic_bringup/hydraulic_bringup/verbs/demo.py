@@ -186,7 +186,7 @@ def _print(analysis: offline.Analysis, console: Console) -> None:
         figures = [record["channels"].get(name, {}).get("horizon") for name in channels]
         cells = [_cell(f, c["unit"]) for f, c in zip(figures, channels.values(), strict=True)]
         table.add_row(record["name"], *cells)
-    noise = [compared["summary"][name]["noise"] for name in channels]
+    noise = [compared["summary"][name]["noise_std"] for name in channels]
     table.add_section()
     table.add_row("noise", *(quantity(n, c["unit"]) for n, c in zip(noise, channels.values(), strict=True)))
     console.print(table)
