@@ -16,7 +16,8 @@ from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.diagnosis.compare import compare
 from hydraulic_sysid.linear.identification import identify
-from hydraulic_sysid.report import compare_figures, identify_figures, render, write_page
+from hydraulic_sysid.report import identify_figures, render, write_page
+from hydraulic_sysid.report.compare import figures as compare_figures
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
 
@@ -74,7 +75,7 @@ def test_every_figure_has_its_place_and_its_data(page: str) -> None:
 
 
 def test_curves_are_those_of_the_document(comparison: dict[str, Any]) -> None:
-    figure = json.loads(compare_figures.overlay(comparison, 0).to_json())
+    figure = json.loads(compare_figures.overlay(comparison, comparison["records"][0]).to_json())
     measured = next(t for t in figure["data"] if t["name"] == "measured")
     stored = comparison["records"][0]["traces"]["position"]["measured"]
     assert np.allclose(trace_values(measured["y"]), 1e3 * np.array(stored["value"]), rtol=1e-6)
@@ -82,20 +83,20 @@ def test_curves_are_those_of_the_document(comparison: dict[str, Any]) -> None:
 
 
 def test_figures_carry_units_and_share_time(comparison: dict[str, Any]) -> None:
-    figure = compare_figures.overlay(comparison, 0)
+    figure = compare_figures.overlay(comparison, comparison["records"][0])
     titles = [figure.layout[k].title.text for k in figure.layout if k.startswith("yaxis")]
-    assert {"position<br>[mm]", "velocity<br>[mm/s]", "pressure A<br>[MPa]", "drive<br>[V]"} <= set(titles)
+    assert {"position<br>[mm]", "velocity<br>[mm/s]", "pressure A<br>[bar]", "drive<br>[V]"} <= set(titles)
     assert {t.xaxis for t in figure.data} == {"x"}
     maps = compare_figures.error_maps(comparison, "velocity")
     assert maps.layout.yaxis.title.text == "error [mm/s]"
 
 
 def test_every_figure_function_makes_one(comparison: dict[str, Any], folder: Path) -> None:
-    identification = results.read_result(folder / "identify.json")
+    identification, records = results.read_result(folder / "identify.json"), comparison["records"]
     made = [
-        compare_figures.spectra(comparison, 0),
-        compare_figures.growth(comparison, 1),
-        *(compare_figures.error_maps(comparison, c, r) for c in comparison["channels"] for r in (None, 0, 1)),
+        compare_figures.spectra(comparison, records[0]),
+        compare_figures.growth(comparison, records[1]),
+        *(compare_figures.error_maps(comparison, c, r) for c in comparison["channels"] for r in (None, *records)),
         identify_figures.overlay(identification, "test", 0),
         identify_figures.residual_tests(identification, "fit", 0),
         identify_figures.poles(identification),

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 SHOWN: dict[str, tuple[float, str]] = {
     "m": (1e3, "mm"),
     "m/s": (1e3, "mm/s"),
-    "Pa": (1e-6, "MPa"),
+    "m^2": (1e4, "cm²"),
+    "m^3": (1e6, "cm³"),
+    "Pa": (1e-5, "bar"),
     "N": (1e-3, "kN"),
+    "N/m": (1e-6, "kN/mm"),
     "m^3/s": (6e4, "l/min"),
-    "V": (1.0, "V"),
-    "s": (1.0, "s"),
+    "m^3/Pa": (1e11, "cm³/bar"),
+    "m^3/(s*Pa)": (6e9, "(l/min)/bar"),
+    "m^3/(s*Pa^0.5)": (6e4 * 1e5**0.5, "(l/min)/√bar"),
     "1": (100.0, "%"),
 }
-"""SI unit → factor and unit shown."""
+"""SI unit → factor and unit shown; every other unit is shown as it is."""
 
 TITLES = {
     "position": "position",
@@ -34,21 +40,35 @@ TITLES = {
 MODES = {"free_run": "Free run", "horizon": "Horizon", "one_step": "One step"}
 
 
-def number(value: float) -> str:
-    """Three significant digits, whole numbers from a hundred on, with a true minus sign."""
-    shown = f"{value:.0f}" if abs(value) >= 99.5 else f"{value:.3g}"
-    return shown.replace("-", "−")
+_TYPESET = str.maketrans({"*": "·", "2": "²", "3": "³", "^": None})
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SHORT = 0.1
+"""Seconds below which a time is shown in milliseconds."""
 
 
-def quantity(value: float, unit: str) -> str:
-    """A number with the unit that users of such benches read: 0.0123 m → ``12.3 mm``."""
-    scale, name = SHOWN.get(unit, (1.0, unit))
-    return f"{number(value * scale)} {name}"
+def shown(unit: str) -> tuple[float, str]:
+    """Factor to, and name of, the unit in which a user reads a quantity of an SI unit."""
+    return SHOWN.get(unit, (1.0, unit.translate(_TYPESET)))
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """So many significant digits, but never less than whole numbers, with a true minus sign; a dash for no number."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    text = f"{value:.0f}" if abs(value) >= 10.0 ** (digits - 1) - 0.5 else f"{value:.{digits}g}"
+    mantissa, _, power = text.partition("e")
+    return (f"{mantissa}·10{str(int(power)).translate(_RAISED)}" if power else mantissa).replace("-", "−")
+
+
+def quantity(value: float | None, unit: str, digits: int = 3) -> str:
+    """A number with the unit that users of such benches read: 0.0123 m → ``12.3 mm``; a dash for no number."""
+    scale, name = (1e3, "ms") if unit == "s" and value and abs(value) < _SHORT else shown(unit)
+    return "–" if value is None or not math.isfinite(value) else f"{number(value * scale, digits)} {name}"
 
 
 def span(low: float, high: float, unit: str) -> str:
     """Two numbers with one unit: ``−546 … 579 mm``."""
-    scale, name = SHOWN.get(unit, (1.0, unit))
+    scale, name = shown(unit)
     return f"{number(low * scale)} … {number(high * scale)} {name}"
 
 

@@ -95,7 +95,7 @@ def traces(plan: dict[str, Any], limits: dict[str, Any]) -> go.Figure:
                 panel, style.values(other["time"]), style.values(other["value"], factor), TITLES["pressure_b"],
                 line={"color": style.HORIZON, "width": 1.0},
             )  # fmt: skip
-        panels.y_axis(panel, f"{TITLES[channel] if channel != 'pressure_a' else 'pressures'}<br>[{shown}]", nticks=5)
+        panels.y_axis(panel, f"{TITLES[channel] if channel != 'pressure_a' else 'pressures'}\n[{shown}]", nticks=5)
         limit = limits.get(_BOUNDS.get(channel, ""))
         if limit is not None:
             centre = float(plan["plan"].get("centre", 0.0)) if channel == "position" else 0.0

@@ -55,7 +55,7 @@ def bode(result: Result) -> go.Figure:
         panels.line(0, x, style.values(magnitude, factor), name, legend=True, **look)
         panels.line(1, x, style.values(clear * _wrapped(curve["phase"])), name, **look)
         panels.line(2, x, style.values(curve["coherence"]), name, **look)
-    panels.y_axis(0, f"magnitude<br>[{unit}]", **_LOG)
+    panels.y_axis(0, f"magnitude\n[{unit}]", **_LOG)
     panels.y_axis(1, "phase [°]", dtick=90, range=[-275.0, 95.0])
     panels.y_axis(2, "coherence", range=[0.0, 1.05], nticks=3)
     panels.x_axis(

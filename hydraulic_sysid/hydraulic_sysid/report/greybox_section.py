@@ -60,8 +60,8 @@ def traces(channel: Result, record: int) -> go.Figure:
     for key, panel, title, colour, width in parts:
         x, y = style.values(own[key]["time"]), style.values(own[key]["value"], factor)
         panels.line(panel, x, y, title, legend=True, line={"color": colour, "width": width})
-    panels.y_axis(0, f"{channel['title']}<br>[{unit}]", nticks=6)
-    panels.y_axis(1, f"left<br>[{unit}]", nticks=4)
+    panels.y_axis(0, f"{channel['title']}\n[{unit}]", nticks=6)
+    panels.y_axis(1, f"left\n[{unit}]", nticks=4)
     panels.x_axis(0, "time [s]", anchor="y2", mirror="all")
     return panels.figure(360, hovermode="x unified", hoversubplots="axis")
 

@@ -14,16 +14,19 @@ import plotly.graph_objects as go
 class Figures:
     """The figures of a page: given a place each, and written once, to be drawn when they come into view."""
 
-    specs: dict[str, str] = field(default_factory=dict)
+    specs: dict[str, go.Figure] = field(default_factory=dict)
+
+    def add(self, figure: go.Figure) -> str:
+        """The name under which the page holds the figure."""
+        name = f"figure-{len(self.specs) + 1}"
+        self.specs[name] = figure
+        return name
 
     def place(self, figure: go.Figure | None) -> str:
         """The element in which a figure will be drawn; nothing for None."""
         if figure is None:
             return ""
-        name = f"figure-{len(self.specs) + 1}"
-        # "</" would end the script element that carries the figure.
-        self.specs[name] = str(figure.to_json()).replace("</", "<\\/")
-        return f'<div class="plot" data-figure="{name}" style="height:{int(figure.layout.height)}px"></div>'
+        return f'<div class="plot" data-figure="{self.add(figure)}" style="height:{int(figure.layout.height)}px"></div>'
 
 
 def text(value: Any) -> str:

@@ -31,9 +31,9 @@ def overlay(result: Result, part: str, record: int) -> go.Figure:
         x, y = style.values(traces[key]["time"]), style.values(traces[key]["value"], scale)
         line = {"color": colour, "width": width}
         panels.line(panel, x, y, label, legend=panel == 1, line=line, hovertemplate="%{y:.4g}")
-    panels.y_axis(0, f"{settings['input']['channel']}<br>[{input_unit}]", nticks=4)
-    panels.y_axis(1, f"{settings['output']['channel']}<br>[{unit}]", nticks=6)
-    panels.y_axis(2, f"error<br>[{unit}]", nticks=5)
+    panels.y_axis(0, f"{settings['input']['channel']}\n[{input_unit}]", nticks=4)
+    panels.y_axis(1, f"{settings['output']['channel']}\n[{unit}]", nticks=6)
+    panels.y_axis(2, f"error\n[{unit}]", nticks=5)
     panels.x_axis(0, "time [s]", anchor="y3", mirror="all")
     return panels.figure(430, hovermode="x unified", hoversubplots="axis")
 

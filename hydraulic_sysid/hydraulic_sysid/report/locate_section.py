@@ -6,8 +6,8 @@ from typing import Any
 
 from hydraulic_sysid.data.display import first_upper, number, percent, quantity
 
-from . import compare_figures
 from . import locate_figures as figures
+from .compare import figures as compare_figures
 from .html import Figures, choice, made_on, section, table, tag, text
 
 Result = dict[str, Any]

@@ -142,7 +142,7 @@ def traces(result: Result) -> go.Figure:
         0, style.values(drive["time"]), style.values(drive["value"]), "drive",
         line={"color": style.MEASURED, "width": 1.2},
     )  # fmt: skip
-    panels.y_axis(0, "drive<br>[V]", nticks=5)
+    panels.y_axis(0, "drive\n[V]", nticks=5)
     for panel, channel in enumerate(channels, 1):
         factor, unit = style.shown(_UNITS[channel])
         for i, name in enumerate(names):
@@ -151,7 +151,7 @@ def traces(result: Result) -> go.Figure:
                 panel, style.values(trace["time"]), style.values(trace["value"], factor), name, legend=panel == 1,
                 line={"color": _COLOURS[i % len(_COLOURS)], "width": 1.4, "dash": "solid" if i == 0 else "dot"},
             )  # fmt: skip
-        panels.y_axis(panel, f"{TITLES[channel]}<br>[{unit}]", nticks=5)
+        panels.y_axis(panel, f"{TITLES[channel]}\n[{unit}]", nticks=5)
     for m in result["movements"]:
         panels.shapes.append(
             {"type": "line", "xref": "x", "yref": "paper", "x0": m["start"], "x1": m["start"], "y0": 0, "y1": 1,
@@ -176,7 +176,7 @@ def differences(pair: dict[str, Any]) -> go.Figure:
         largest = float(np.nanmax(np.abs(style.values(trace["value"])), initial=0.0))
         panels.band(panel, -1.0, 1.0)
         panels.y_axis(
-            panel, f"{TITLES.get(channel, channel)}<br>[× noise]", nticks=5,
+            panel, f"{TITLES.get(channel, channel)}\n[× noise]", nticks=5,
             range=[-1.1 * max(largest, 1.5), 1.1 * max(largest, 1.5)],
         )  # fmt: skip
     panels.shapes = [{**s, "xref": "x domain"} for s in panels.shapes]

@@ -1,20 +1,23 @@
-"""The page: a heading, one part per result, Plotly's script once, and the figures' data."""
+"""The page: every result shown by the folder of its kind, Plotly's script once, and the figures' data."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
-from importlib import resources
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from hydraulic_sysid.data import display
 from hydraulic_sysid.data.results import PAGE, PAGE_MARK, ResultError, verb_of, write_text
 
 from . import (
-    bandwidth_section,
     calibrate_section,
-    compare_section,
     design_section,
     diagnose_section,
     frequency_response_section,
@@ -25,16 +28,14 @@ from . import (
     paper_section,
     validate_section,
 )
-from .html import Figures, tag, text
+from .html import Figures
 
 Result = dict[str, Any]
 
-# A result's schema chooses how it is shown; a new kind of result adds its section here.
+# Sections that are not templates yet.
 SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
     "hydraulic_sysid.add/2": diagnose_section.html,
-    "hydraulic_sysid.bandwidth/2": bandwidth_section.html,
     "hydraulic_sysid.calibrate/2": calibrate_section.html,
-    "hydraulic_sysid.compare/2": compare_section.html,
     "hydraulic_sysid.design/1": design_section.html,
     "hydraulic_sysid.diagnose/2": diagnose_section.html,
     "hydraulic_sysid.frequency_response/2": frequency_response_section.html,
@@ -47,6 +48,20 @@ SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
 }
 
 
+FILTERS: dict[str, Callable[..., Any]] = {
+    "first_upper": display.first_upper,
+    "number": display.number,
+    "percent": display.percent,
+    "quantity": display.quantity,
+    "shell": lambda text: shlex.quote(str(text)),
+    "shown": display.shown,
+    "span": display.span,
+    "verb": verb_of,
+    "words": lambda name: display.TITLES.get(name, name.replace("_", " ")),
+}
+"""How templates show numbers and names."""
+
+
 def render(results: Sequence[Result]) -> str:
     """HTML of one page for the results, in the order given. It needs no other file and no network.
 
@@ -54,25 +69,20 @@ def render(results: Sequence[Result]) -> str:
     """
     if not results:
         raise ResultError("there is no result to show")
-    figures = Figures()
-    parts = []
+    place, known = Figures(), _kinds()
+    parts: list[tuple[Result, str, ModuleType | None, Markup | None]] = []
     for result in results:
-        if result["schema"] not in SECTIONS:
-            raise ResultError(f"schema {result['schema']!r} cannot be shown; known are {', '.join(SECTIONS)}")
-        parts.append(SECTIONS[result["schema"]](result, figures))
-    software = ", ".join(f"{text(name)} {text(version)}" for name, version in results[0]["software"].items())
-    footer = tag("footer", f"Every number and curve on this page stands in {_files(results)}. Made with {software}.")
-    scripts = "".join(
-        f'<script type="application/json" id="{name}">{spec}</script>\n' for name, spec in figures.specs.items()
-    )
-    title = text(_title(results))
-    return (
-        f'<!doctype html>\n{PAGE_MARK}\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{title}</title>\n'
-        f"<style>\n{_asset('page.css')}</style>\n</head>\n<body>\n<main>\n"
-        f'<button class="theme" id="theme" type="button">Theme</button>\n'
-        f"{''.join(parts)}{footer}\n</main>\n"
-        f"<script>{get_plotlyjs()}</script>\n{scripts}<script>\n{_asset('page.js')}</script>\n</body>\n</html>\n"
+        schema = result["schema"]
+        if schema in known:
+            parts.append((result, f"{known[schema]}/section.html.j2", _module(f"{known[schema]}.figures"), None))
+        elif schema in SECTIONS:
+            parts.append((result, "", None, Markup(SECTIONS[schema](result, place))))
+        else:
+            shown = ", ".join(sorted([*known, *SECTIONS]))
+            raise ResultError(f"schema {schema!r} cannot be shown; known are {shown}")
+    page = _environment().get_template("page.html.j2")
+    return page.render(
+        title=_title(results), parts=parts, place=place, mark=Markup(PAGE_MARK), plotly=Markup(get_plotlyjs())
     )
 
 
@@ -83,6 +93,31 @@ def write_page(folder: Path, results: Sequence[Result]) -> Path:
     return path
 
 
+def _kinds() -> dict[str, str]:
+    """Schema → folder that shows such a result."""
+    folders = [template.parent.name for template in Path(__file__).parent.glob("*/section.html.j2")]
+    return {_module(folder).SCHEMA: folder for folder in folders}
+
+
+def _module(name: str) -> ModuleType:
+    return import_module(f".{name}", __package__)
+
+
+def _environment() -> Environment:
+    """Templates in which every value is escaped, and a name that is not there is an error."""
+    made = Environment(
+        loader=PackageLoader(str(__package__), ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= FILTERS
+    # The filter tojson escapes what could end the script element in which it stands.
+    made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json()
+    return made
+
+
 def _title(results: Sequence[Result]) -> str:
     for result in results:
         if "title" in result:
@@ -90,11 +125,3 @@ def _title(results: Sequence[Result]) -> str:
         if "name" in result["model"]:
             return f"{result['model']['name']} against measurements"
     return "Identified model"
-
-
-def _files(results: Sequence[Result]) -> str:
-    return " and ".join(tag("code", f"{text(verb_of(result))}.json") for result in results)
-
-
-def _asset(name: str) -> str:
-    return (resources.files(__package__) / "assets" / name).read_text(encoding="utf-8")

@@ -19,9 +19,7 @@ _MARGIN = {"l": 66, "r": 14, "t": 40, "b": 44}
 def data(excitation: dict[str, Any]) -> go.Figure:
     """Drive and position of one excitation, and where the held-out part begins."""
     panels = Panels(2, gap=(0.0, 0.03), one_time=True)
-    for panel, (key, factor, title) in enumerate(
-        (("drive", 1.0, "drive<br>[V]"), ("position", 1e3, "position<br>[mm]"))
-    ):
+    for panel, (key, factor, title) in enumerate((("drive", 1.0, "drive\n[V]"), ("position", 1e3, "position\n[mm]"))):
         trace = excitation["traces"][key]
         line = {"color": style.MEASURED if panel == 0 else COLOURS[excitation["excitation"]], "width": 1.3}
         panels.line(panel, style.values(trace["time"]), style.values(trace["value"], factor), key, line=line)
@@ -46,8 +44,8 @@ def fit(excitation: dict[str, Any]) -> go.Figure:
         trace = excitation["traces"][key]
         x, y = style.values(trace["time"]), style.values(trace["value"], 1e3)
         panels.line(panel, x, y, name, legend=panel == 0, line={"color": colour, "width": width})
-    panels.y_axis(0, "position<br>[mm]", nticks=6)
-    panels.y_axis(1, "difference<br>[mm]", nticks=4)
+    panels.y_axis(0, "position\n[mm]", nticks=6)
+    panels.y_axis(1, "difference\n[mm]", nticks=4)
     panels.x_axis(0, "time in the held-out part [s]", anchor="y2", mirror="all")
     return panels.figure(360, margin=_MARGIN, hovermode="x unified", hoversubplots="axis")
 

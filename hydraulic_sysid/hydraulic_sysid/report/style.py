@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from html import escape
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from hydraulic_sysid.data.display import SHOWN
+from hydraulic_sysid.data.display import shown as shown
 
 Array = NDArray[np.float32]
 
@@ -32,18 +34,13 @@ def values(data: Any, factor: float = 1.0) -> Array:
     return (np.asarray(data, dtype=float) * factor).astype(np.float32)
 
 
-def shown(unit: str) -> tuple[float, str]:
-    """Factor to and name of the unit on the page; an unknown unit is shown as it is."""
-    return SHOWN.get(unit, (1.0, unit))
-
-
 @dataclass
 class Panels:
     """Panels of one figure in rows and columns, gathered as plain dictionaries.
 
     (Plotly's own figure methods check every call against its whole schema, which takes longer than comparing
     the records.) With ``one_time`` all panels are stacked on one x axis, so that zooming and hovering act on
-    all.
+    all. Every text is plain: Plotly reads tags in it, which are escaped, and a line break is ``\\n``.
     """
 
     rows: int
@@ -85,6 +82,21 @@ class Panels:
              "showlegend": legend, "xaxis": axis_x, "yaxis": axis_y, **trace}
         )  # fmt: skip
 
+    def trace(self, panel: int, trace: Mapping[str, Any], factor: float, name: str, colour: str, width: float = 1.2,
+              legend: bool = False, **more: Any) -> None:  # fmt: skip
+        """A line over time of a document's trace, in the unit shown."""
+        x, y = values(trace["time"]), values(trace["value"], factor)
+        line = {"color": colour, "width": width, **more.pop("line", {})}
+        self.line(panel, x, y, name, legend, line=line, hovertemplate="%{y:.4g}", **more)
+
+    def limit(self, panel: int, x: float | None = None, y: float | None = None, colour: str = MEASURED) -> None:
+        """A dotted line across a panel at a value of x or of y."""
+        name_x, name_y = self._names(panel)
+        line = {"color": colour, "width": 1.5, "dash": "dot"}
+        along = {"x0": 0, "x1": 1, "y0": y, "y1": y, "xref": f"{name_x} domain", "yref": name_y}
+        upright = {"x0": x, "x1": x, "y0": 0, "y1": 1, "xref": name_x, "yref": f"{name_y} domain"}
+        self.shapes.append({"type": "line", "line": line, **(along if x is None else upright)})
+
     def band(self, panel: int, low: float, high: float) -> None:
         """A grey band across a panel."""
         x, y = self._names(panel)
@@ -115,7 +127,7 @@ class Panels:
             "shapes": self.shapes,
             "annotations": self.annotations,
         }
-        return go.Figure({"data": self.traces, "layout": {**common, **self.axes, **layout}})
+        return go.Figure(_plain({"data": self.traces, "layout": {**common, **self.axes, **layout}}))
 
     def _names(self, panel: int) -> tuple[str, str]:
         number = "" if panel == 0 else str(panel + 1)
@@ -125,3 +137,16 @@ class Panels:
         if title:
             self.axes[axis]["title"]["text"] = title
         self.axes[axis].update(settings)
+
+
+def _plain(value: Any) -> Any:
+    """The same with every text escaped, so that no name in a document becomes a tag of Plotly's."""
+    if isinstance(value, str):
+        return (
+            escape(value, quote=False).replace("\n", "<br>").replace("&lt;extra&gt;&lt;/extra&gt;", "<extra></extra>")
+        )
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype.kind in "UO"):
+        return [_plain(item) for item in value]
+    return value

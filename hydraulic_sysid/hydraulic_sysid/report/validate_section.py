@@ -28,7 +28,7 @@ def rmse_bars(result: Result) -> go.Figure:
     panels = Panels(rows, columns, gap=(0.08, 0.26 if rows > 1 else 0.0), titles=[s.capitalize() for s in shapes])
     for panel, shape in enumerate(shapes):
         cells = [c for c in result["grid"] if c["shape"] == shape]
-        names = [f"{c['amplitude']:g} V<br>{c['frequency']:g} Hz{'' if c['within_travel'] else ' *'}" for c in cells]
+        names = [f"{c['amplitude']:g} V\n{c['frequency']:g} Hz{'' if c['within_travel'] else ' *'}" for c in cells]
         for index, model in enumerate(result["models"]):
             panels.line(
                 panel,

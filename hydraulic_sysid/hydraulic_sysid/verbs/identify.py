@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hydraulic_sysid.data import results
-from hydraulic_sysid.data.display import SHOWN, number
+from hydraulic_sysid.data.display import number, shown
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.linear import identification
 from hydraulic_sysid.linear.models import (
@@ -130,7 +130,7 @@ def _structure(options: argparse.Namespace) -> Structure:
 
 def _print(result: dict[str, Any], console: Console) -> None:
     own = result["settings"]["output"]["unit"]
-    factor, unit = SHOWN.get(own, (1.0, own))
+    factor, unit = shown(own)
     table = Table(title="Best fit in free run and one step ahead", title_justify="left")
     for title in ("record", "data", "samples", "free run", "one step", f"MSE, one step, {unit}²"):
         left = title in ("record", "data")

@@ -18,7 +18,7 @@ from rich.table import Table
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data import results
-from hydraulic_sysid.data.display import SHOWN, number
+from hydraulic_sysid.data.display import number, shown
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.linear.models import IdentificationError, read_linear_model
 from hydraulic_sysid.linear.validation import SHAPES, Grid
@@ -93,7 +93,7 @@ def _subjects(paths: list[Path]) -> dict[str, Subject]:
 
 def _print(result: dict[str, Any], console: Console) -> None:
     own = result["settings"]["output"]["unit"]
-    factor, unit = SHOWN.get(own, (1.0, own))
+    factor, unit = shown(own)
     names = [m["name"] for m in result["models"]]
     table = Table(title=f"RMSE [{unit}] and best fit of the free run", title_justify="left")
     table.add_column("drive", no_wrap=True)

@@ -47,6 +47,8 @@
     buttons.forEach((b, i) => b.addEventListener("click", () => show(i)));
   });
 
+  addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
+
   const order = ["auto", "light", "dark"];
   const button = document.getElementById("theme");
   function theme(name) {

@@ -1,0 +1,3 @@
+"""A bandwidth."""
+
+SCHEMA = "hydraulic_sysid.bandwidth/2"

@@ -1,0 +1,3 @@
+"""A model against measurements."""
+
+SCHEMA = "hydraulic_sysid.compare/2"
