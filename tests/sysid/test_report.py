@@ -16,8 +16,9 @@ from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.diagnosis.compare import compare
 from hydraulic_sysid.linear.identification import identify
-from hydraulic_sysid.report import identify_figures, render, write_page
+from hydraulic_sysid.report import render, write_page
 from hydraulic_sysid.report.compare import figures as compare_figures
+from hydraulic_sysid.report.identify import figures as identify_figures
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
 
@@ -97,9 +98,9 @@ def test_every_figure_function_makes_one(comparison: dict[str, Any], folder: Pat
         compare_figures.spectra(comparison, records[0]),
         compare_figures.growth(comparison, records[1]),
         *(compare_figures.error_maps(comparison, c, r) for c in comparison["channels"] for r in (None, *records)),
-        identify_figures.overlay(identification, "test", 0),
-        identify_figures.residual_tests(identification, "fit", 0),
-        identify_figures.poles(identification),
+        identify_figures.overlay(identification["settings"], identification["test"]["records"][0]),
+        identify_figures.residual_tests(identification["fit"]["records"][0]),
+        identify_figures.poles(identification["model"]),
     ]
     assert all(f.data for f in made)
 

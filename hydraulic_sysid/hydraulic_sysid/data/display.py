@@ -60,10 +60,17 @@ def number(value: float | None, digits: int = 3) -> str:
     return (f"{mantissa}·10{str(int(power)).translate(_RAISED)}" if power else mantissa).replace("-", "−")
 
 
-def quantity(value: float | None, unit: str, digits: int = 3) -> str:
-    """A number with the unit that users of such benches read: 0.0123 m → ``12.3 mm``; a dash for no number."""
-    scale, name = (1e3, "ms") if unit == "s" and value and abs(value) < _SHORT else shown(unit)
-    return "–" if value is None or not math.isfinite(value) else f"{number(value * scale, digits)} {name}"
+def quantity(value: float | None, unit: str, digits: int = 3, power: int = 1) -> str:
+    """A number with the unit that users of such benches read: 0.0123 m → ``12.3 mm``; a dash for no number.
+
+    :param power: of the unit, 2 for mean squares
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    scale, name = (1e3, "ms") if unit == "s" and 0.0 < abs(value) < _SHORT else shown(unit)
+    if power == 2:
+        name = f"({name})²" if "/" in name else f"{name}²"
+    return f"{number(value * scale**power, digits)} {name}"
 
 
 def span(low: float, high: float, unit: str) -> str:

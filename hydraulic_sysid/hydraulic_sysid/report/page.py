@@ -18,15 +18,9 @@ from hydraulic_sysid.data.results import PAGE, PAGE_MARK, ResultError, verb_of, 
 
 from . import (
     calibrate_section,
-    design_section,
     diagnose_section,
-    frequency_response_section,
-    greybox_section,
-    identify_section,
     locate_section,
     next_experiment_section,
-    paper_section,
-    validate_section,
 )
 from .html import Figures
 
@@ -36,26 +30,25 @@ Result = dict[str, Any]
 SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
     "hydraulic_sysid.add/2": diagnose_section.html,
     "hydraulic_sysid.calibrate/2": calibrate_section.html,
-    "hydraulic_sysid.design/1": design_section.html,
     "hydraulic_sysid.diagnose/2": diagnose_section.html,
-    "hydraulic_sysid.frequency_response/2": frequency_response_section.html,
-    "hydraulic_sysid.greybox/2": greybox_section.html,
-    "hydraulic_sysid.identify/3": identify_section.html,
     "hydraulic_sysid.locate/2": locate_section.html,
     "hydraulic_sysid.next_experiment/2": next_experiment_section.html,
-    "hydraulic_sysid.paper/2": paper_section.html,
-    "hydraulic_sysid.validate/2": validate_section.html,
 }
+
+
+def _whole(shown: Callable[..., str]) -> Callable[..., str]:
+    """The same, with spaces at which no line breaks: a number stays with its unit."""
+    return lambda *values, **settings: shown(*values, **settings).replace(" ", "\u00a0")
 
 
 FILTERS: dict[str, Callable[..., Any]] = {
     "first_upper": display.first_upper,
-    "number": display.number,
-    "percent": display.percent,
-    "quantity": display.quantity,
+    "number": _whole(display.number),
+    "percent": _whole(display.percent),
+    "quantity": _whole(display.quantity),
     "shell": lambda text: shlex.quote(str(text)),
     "shown": display.shown,
-    "span": display.span,
+    "span": _whole(display.span),
     "verb": verb_of,
     "words": lambda name: display.TITLES.get(name, name.replace("_", " ")),
 }

@@ -22,11 +22,21 @@ HORIZON = "#3a8fd0"
 ONE_STEP = "#2fa37c"
 FLOOR = "#8b93a1"
 BAND = "rgba(58,143,208,0.22)"
+MORE = ("#b07cc6", "#c9a227")
+"""For a fourth and a fifth curve."""
+FAINT = "rgba(128,138,150,0.10)"
 FLOOR_BAND = "rgba(139,147,161,0.25)"
+TITLED = {"l": 66, "r": 14, "t": 52, "b": 44}
+"""Margins of a figure whose panels have titles, below the tool bar."""
 _GRID = "rgba(128,138,150,0.22)"
 _FRAME = "rgba(128,138,150,0.45)"
 _TEXT = "#7b8490"
 _AXIS = {"gridcolor": _GRID, "zerolinecolor": _FRAME, "linecolor": _FRAME, "showline": True, "mirror": True}
+
+
+def below(distance: float) -> dict[str, Any]:
+    """A legend below the panels, in parts of the plot's height."""
+    return {"orientation": "h", "x": 0, "y": -distance, "yanchor": "top"}
 
 
 def values(data: Any, factor: float = 1.0) -> Array:
@@ -98,12 +108,17 @@ class Panels:
         self.shapes.append({"type": "line", "line": line, **(along if x is None else upright)})
 
     def band(self, panel: int, low: float, high: float) -> None:
-        """A grey band across a panel."""
+        """A grey band across a panel, between two values of y."""
         x, y = self._names(panel)
-        self.shapes.append(
-            {"type": "rect", "xref": f"{x} domain", "yref": y, "x0": 0, "x1": 1, "y0": low, "y1": high,
-             "fillcolor": FLOOR_BAND, "line": {"width": 0}, "layer": "below"}
-        )  # fmt: skip
+        self._grey({"xref": f"{x} domain", "yref": y, "x0": 0, "x1": 1, "y0": low, "y1": high})
+
+    def interval(self, panel: int, start: float, end: float) -> None:
+        """A grey band up a panel, between two values of x."""
+        x, y = self._names(panel)
+        self._grey({"xref": x, "yref": f"{y} domain", "x0": start, "x1": end, "y0": 0, "y1": 1})
+
+    def _grey(self, place: dict[str, Any]) -> None:
+        self.shapes.append({"type": "rect", "fillcolor": FLOOR_BAND, "line": {"width": 0}, "layer": "below", **place})
 
     def x_axis(self, panel: int, title: str = "", **settings: Any) -> None:
         """Title and settings of a panel's x axis."""

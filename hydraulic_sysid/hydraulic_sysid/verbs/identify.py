@@ -147,8 +147,7 @@ def _print(result: dict[str, Any], console: Console) -> None:
     if result["orders"]:
         console.print(f"{result['settings']['criterion'].upper()} chose it among {len(result['orders'])} orders")
     console.print(
-        f"final prediction error {number(result['test']['fpe'] * factor**2)} {unit}² "
-        "(what is expected on fresh data)"
+        f"final prediction error {number(result['test']['fpe'] * factor**2)} {unit}² (what is expected on fresh data)"
     )
     poles = ", ".join(_pole(p) for p in result["model"]["poles"])
     console.print(f"poles {poles}")

@@ -14,7 +14,6 @@ from hydraulic_sysid.report.style import Panels
 
 Result = dict[str, Any]
 
-_MARGIN = {"l": 66, "r": 14, "t": 52, "b": 44}  # room for titles below the tool bar
 _DIRECTIONS = {-1: "retracting", 0: "standing", 1: "extending"}
 
 
@@ -83,7 +82,7 @@ def error_maps(result: Result, channel: str, record: Result | None = None) -> go
         first = panel % columns == 0
         shared = {} if panel == 0 else {"matches": "y"}
         panels.y_axis(panel, f"error [{unit}]" if first else "", showticklabels=first, **shared)
-    return panels.figure(104 + 230 * rows, hovermode="closest", margin=_MARGIN)
+    return panels.figure(104 + 230 * rows, hovermode="closest", margin=style.TITLED)
 
 
 def spectra(result: Result, record: Result) -> go.Figure:
@@ -127,8 +126,7 @@ def _log_panels(
         panels.x_axis(panel, x_title, **_log_axis(x))
         curves = [v * factor for key, *_ in parts for v in source[name][key] if v]
         panels.y_axis(panel, f"[{y_unit.format(unit)}]", **_log_axis(curves))
-    legend = {"orientation": "h", "x": 0, "y": -56 / (200 * rows), "yanchor": "top"}
-    return panels.figure(134 + 200 * rows, legend=legend, margin={**_MARGIN, "b": 86})
+    return panels.figure(134 + 200 * rows, legend=style.below(56 / (200 * rows)), margin={**style.TITLED, "b": 86})
 
 
 def _log_axis(data: list[float]) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from . import style
-from .style import Panels
+from hydraulic_sysid.report import style
+from hydraulic_sysid.report.style import Panels
 
 Result = dict[str, Any]
 
@@ -17,36 +17,31 @@ _MARGIN = {"l": 66, "r": 14, "t": 40, "b": 44}
 
 
 def data(excitation: dict[str, Any]) -> go.Figure:
-    """Drive and position of one excitation, and where the held-out part begins."""
+    """Drive and position of one excitation, and where the test data begin."""
     panels = Panels(2, gap=(0.0, 0.03), one_time=True)
-    for panel, (key, factor, title) in enumerate((("drive", 1.0, "drive\n[V]"), ("position", 1e3, "position\n[mm]"))):
-        trace = excitation["traces"][key]
-        line = {"color": style.MEASURED if panel == 0 else COLOURS[excitation["excitation"]], "width": 1.3}
-        panels.line(panel, style.values(trace["time"]), style.values(trace["value"], factor), key, line=line)
-        panels.y_axis(panel, title, nticks=5)
-        panels.shapes.append(
-            {"type": "rect", "xref": "x", "yref": f"y{panel + 1 if panel else ''} domain", "y0": 0, "y1": 1,
-             "x0": excitation["test_from"], "x1": excitation["duration"], "fillcolor": style.FLOOR_BAND,
-             "line": {"width": 0}, "layer": "below"}
-        )  # fmt: skip
+    colours = style.MEASURED, COLOURS[excitation["excitation"]]
+    for panel, (key, unit) in enumerate((("drive", "V"), ("position", "m"))):
+        factor, shown = style.shown(unit)
+        panels.trace(panel, excitation["traces"][key], factor, key, colours[panel], 1.3)
+        panels.y_axis(panel, f"{key}\n[{shown}]", nticks=5)
+        panels.interval(panel, excitation["test_from"], excitation["duration"])
     panels.x_axis(0, "time [s]", anchor="y2", mirror="all")
     return panels.figure(330, margin=_MARGIN, hovermode="x unified", hoversubplots="axis", showlegend=False)
 
 
 def fit(excitation: dict[str, Any]) -> go.Figure:
-    """Measured and simulated position on the held-out part, and their difference."""
+    """Measured and simulated position on the test data, and their difference."""
     panels = Panels(2, heights=[2.0, 1.0], gap=(0.0, 0.04), one_time=True)
+    factor, unit = style.shown("m")
     for key, name, colour, width, panel in (
         ("measured", "measured", style.MEASURED, 3.2, 0),
         ("free_run", "identified model, free run", COLOURS[excitation["excitation"]], 1.5, 0),
         ("error", "difference", style.ONE_STEP, 1.2, 1),
     ):
-        trace = excitation["traces"][key]
-        x, y = style.values(trace["time"]), style.values(trace["value"], 1e3)
-        panels.line(panel, x, y, name, legend=panel == 0, line={"color": colour, "width": width})
-    panels.y_axis(0, "position\n[mm]", nticks=6)
-    panels.y_axis(1, "difference\n[mm]", nticks=4)
-    panels.x_axis(0, "time in the held-out part [s]", anchor="y2", mirror="all")
+        panels.trace(panel, excitation["traces"][key], factor, name, colour, width, legend=panel == 0)
+    panels.y_axis(0, f"position\n[{unit}]", nticks=6)
+    panels.y_axis(1, f"difference\n[{unit}]", nticks=4)
+    panels.x_axis(0, "time in the test data [s]", anchor="y2", mirror="all")
     return panels.figure(360, margin=_MARGIN, hovermode="x unified", hoversubplots="axis")
 
 
@@ -79,8 +74,9 @@ def rmse(result: Result) -> go.Figure:
                     hovertemplate="%{x}, " + label + ": %{y:.3g} mm<extra></extra>",
                 )
         panels.y_axis(panel, "RMSE [mm]", range=[0.0, 1.08 * highest])
-    legend = {"orientation": "h", "x": 0, "y": -0.1, "yanchor": "top"}
-    return panels.figure(520, barmode="group", legend=legend, margin={**_MARGIN, "b": 90}, hovermode="closest")
+    return panels.figure(
+        520, barmode="group", legend=style.below(0.1), margin={**_MARGIN, "b": 90}, hovermode="closest"
+    )
 
 
 def thesis(result: Result) -> go.Figure:
@@ -115,9 +111,8 @@ def thesis(result: Result) -> go.Figure:
     panels.y_axis(1, "mm", type="log", tickformat="~g", dtick=1)
     for panel in (0, 1):
         panels.x_axis(panel, "excitation over the bandwidth", type="category")
-    legend = {"orientation": "h", "x": 0, "y": -0.22, "yanchor": "top"}
     margin = {**_MARGIN, "t": 60, "b": 90}
-    return panels.figure(380, barmode="group", bargap=0.3, legend=legend, margin=margin, hovermode="closest")
+    return panels.figure(380, barmode="group", bargap=0.3, legend=style.below(0.22), margin=margin, hovermode="closest")
 
 
 def _missing(row: dict[str, Any] | None) -> float | None:

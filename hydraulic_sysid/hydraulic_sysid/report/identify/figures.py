@@ -1,4 +1,4 @@
-"""Figures of an identification. Each function takes the result document and returns a Plotly figure."""
+"""Figures of an identification. Each function takes the result document, or a part of it."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from . import style
-from .style import Panels
+from hydraulic_sysid.report import style
+from hydraulic_sysid.report.style import Panels
 
 Result = dict[str, Any]
 
 
-def overlay(result: Result, part: str, record: int) -> go.Figure:
-    """Measured output, free run and one-step prediction of one record of ``fit`` or ``test``."""
-    traces, settings = result[part]["records"][record]["traces"], result["settings"]
+def overlay(settings: Result, record: Result) -> go.Figure:
+    """Measured output, free run and one-step prediction of one record."""
+    traces = record["traces"]
     input_factor, input_unit = style.shown(settings["input"]["unit"])
     factor, unit = style.shown(settings["output"]["unit"])
     panels = Panels(3, heights=[0.8, 2.0, 1.2], gap=(0.0, 0.03), one_time=True)
@@ -28,9 +28,7 @@ def overlay(result: Result, part: str, record: int) -> go.Figure:
         ("one_step_error", 2, "one step ahead", style.ONE_STEP, 1.2, factor),
     )
     for key, panel, label, colour, width, scale in parts:
-        x, y = style.values(traces[key]["time"]), style.values(traces[key]["value"], scale)
-        line = {"color": colour, "width": width}
-        panels.line(panel, x, y, label, legend=panel == 1, line=line, hovertemplate="%{y:.4g}")
+        panels.trace(panel, traces[key], scale, label, colour, width, legend=panel == 1)
     panels.y_axis(0, f"{settings['input']['channel']}\n[{input_unit}]", nticks=4)
     panels.y_axis(1, f"{settings['output']['channel']}\n[{unit}]", nticks=6)
     panels.y_axis(2, f"error\n[{unit}]", nticks=5)
@@ -38,13 +36,12 @@ def overlay(result: Result, part: str, record: int) -> go.Figure:
     return panels.figure(430, hovermode="x unified", hoversubplots="axis")
 
 
-def residual_tests(result: Result, part: str, record: int) -> go.Figure | None:
+def residual_tests(record: Result) -> go.Figure | None:
     """Correlations of the one-step residual with itself and with the input, of the free run's error with the input.
 
-    With their bounds of 99 %; None where the stretch was too short for the test.
+    With their bounds of 99 %; None where the record was too short for the test.
     """
-    entry = result[part]["records"][record]
-    tests, free = entry["residual_tests"], entry["free_run_tests"]
+    tests, free = record["residual_tests"], record["free_run_tests"]
     if tests is None:
         return None
     shown = [
@@ -63,29 +60,25 @@ def residual_tests(result: Result, part: str, record: int) -> go.Figure | None:
         panels.line(panel, x, y, type="bar", marker={"color": colours})
         panels.band(panel, -bound, bound)
         panels.x_axis(panel, "lag [samples]")
-    return panels.figure(270, bargap=0.35, margin={"l": 66, "r": 14, "t": 52, "b": 44})
+    return panels.figure(270, bargap=0.35, margin=style.TITLED)
 
 
-def poles(result: Result) -> go.Figure:
+def poles(model: Result) -> go.Figure:
     """Poles of the model: in the z plane with the unit circle, or in the s plane with the imaginary axis."""
-    found = result["model"]["poles"]
+    found = model["poles"]
     panels = Panels(1)
-    if result["model"]["transfer_function"]["domain"] == "continuous":
+    if model["transfer_function"]["domain"] == "continuous":
         reach = max(1e-9, *(abs(p["imaginary"]) for p in found), *(abs(p["real"]) for p in found))
         border = style.values([0.0, 0.0]), style.values([-1.2 * reach, 1.2 * reach])
     else:
         angle = np.linspace(0.0, 2.0 * np.pi, 181)
         border = style.values(np.cos(angle)), style.values(np.sin(angle))
     panels.line(0, *border, hoverinfo="skip", line={"color": style.FLOOR, "width": 1})
-    panels.line(
-        0,
-        style.values([p["real"] for p in found]),
-        style.values([p["imaginary"] for p in found]),
-        mode="markers",
-        marker={"symbol": "x", "size": 10, "color": [style.HORIZON if p["stable"] else style.FREE_RUN for p in found]},
-        text=[f"{p['natural_frequency_hz']:.3g} Hz, damping {p['damping']:.2f}" for p in found],
-        hoverinfo="text+x+y",
-    )
+    places = style.values([p["real"] for p in found]), style.values([p["imaginary"] for p in found])
+    colours = [style.HORIZON if p["stable"] else style.FREE_RUN for p in found]
+    words = [f"{p['natural_frequency_hz']:.3g} Hz, damping {p['damping']:.2f}" for p in found]
+    cross = {"symbol": "x", "size": 10, "color": colours}
+    panels.line(0, *places, mode="markers", marker=cross, text=words, hoverinfo="text+x+y")
     panels.x_axis(0, "real")
     panels.y_axis(0, "imaginary", scaleanchor="x")
     return panels.figure(300, hovermode="closest")

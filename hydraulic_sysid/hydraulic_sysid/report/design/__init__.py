@@ -1,0 +1,3 @@
+"""A designed excitation."""
+
+SCHEMA = "hydraulic_sysid.design/1"

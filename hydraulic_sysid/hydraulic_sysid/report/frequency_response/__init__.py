@@ -1,0 +1,3 @@
+"""A frequency response."""
+
+SCHEMA = "hydraulic_sysid.frequency_response/2"

@@ -1,0 +1,3 @@
+"""An identified linear model."""
+
+SCHEMA = "hydraulic_sysid.identify/3"
