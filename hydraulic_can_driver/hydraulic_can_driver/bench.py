@@ -13,7 +13,7 @@ from collections.abc import Callable
 from hydraulic_can_driver.bus import Bus, Node
 from hydraulic_can_driver.cia408 import CONTROL_WORDS, State, StateMachine, describe, state_of
 from hydraulic_can_driver.codec import PdoCodec
-from hydraulic_can_driver.errors import BusDownError, CanDriverError, DeviceError
+from hydraulic_can_driver.errors import BusDownError, DeviceError
 from hydraulic_can_driver.faults import NEEDS_CONFIGURE, Fault, FaultLatch
 from hydraulic_can_driver.frames import Frames
 from hydraulic_can_driver.master import PRE_OPERATIONAL, START, Master
@@ -21,6 +21,7 @@ from hydraulic_can_driver.measuring import Measuring
 from hydraulic_can_driver.receiver import HEARTBEAT, OPERATIONAL, Receiver
 from hydraulic_can_driver.supervision import Supervision
 from hydraulic_can_driver.sync import Beat, KernelBeat, LoopBeat
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_interfaces.samples import PlantSample
 
 KERNEL_SYNC = ("socketcan",)
@@ -299,5 +300,5 @@ class Bench:
                 self._quieten()
                 self.master.watch_master(self.bus.valve, False)
                 self._valve_state = state_of(int(self.master.read(self.bus.valve, self._status)))
-            except CanDriverError as error:
+            except HydraulicError as error:
                 self.faults.report(Fault.BUS, str(error))

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-
-class CanDriverError(Exception):
-    """Base of every error of this package."""
+from hydraulic_interfaces.errors import HydraulicError
 
 
-class BusFileError(CanDriverError, ValueError):
+class BusFileError(HydraulicError, ValueError):
     """A bus file is not acceptable; the text begins with file and line."""
 
 
-class CodecError(CanDriverError, ValueError):
-    """A value or a frame that a process data object cannot carry."""
+class CodecError(HydraulicError, ValueError):
+    """A value or a frame that an object of a device cannot carry."""
 
 
-class DeviceError(CanDriverError, RuntimeError):
+class DeviceError(HydraulicError, RuntimeError):
     """A device on the bus does not do, or is not, what the bus file says."""
 
+    exit_code = 1
 
-class BusDownError(CanDriverError, OSError):
+
+class BusDownError(HydraulicError, OSError):
     """Nothing can be sent or received: the interface is missing, down, or has gone bus-off."""
+
+    exit_code = 1

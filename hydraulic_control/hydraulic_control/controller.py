@@ -17,7 +17,7 @@ class Controller:
     """NPID or one of its peers; the drive is always finite and within ``drive_limit``.
 
     ``values`` are parameters by name (`parameters.LAW`), the others have their defaults. Raises
-    `HydraulicControlError` for an unknown name or a value that is not allowed.
+    `ControlError` for an unknown name or a value that is not allowed.
     """
 
     def __init__(self, values: Mapping[str, Any] | None = None) -> None:

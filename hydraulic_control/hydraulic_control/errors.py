@@ -1,7 +1,9 @@
-"""Base of the errors that this package raises for what a user handed in."""
+"""The error of this package."""
 
 from __future__ import annotations
 
+from hydraulic_interfaces.errors import HydraulicError
 
-class HydraulicControlError(ValueError):
-    """Input is not acceptable; the message says where, what was found and what is allowed."""
+
+class ControlError(HydraulicError, ValueError):
+    """Gains, trajectories, identified models or responses are not acceptable; the message says where and why."""

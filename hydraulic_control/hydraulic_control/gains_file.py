@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.error import YAMLError
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.parameters import SPECS, check
 from hydraulic_interfaces.contract import CONTROLLER_NODE, absolute
 
@@ -31,14 +31,14 @@ def shipped() -> tuple[str, ...]:
 
 
 def find(name_or_path: str | Path) -> Path:
-    """The file of that path, or the shipped one of that name. Raises `HydraulicControlError` where there is none."""
+    """The file of that path, or the shipped one of that name. Raises `ControlError` where there is none."""
     path = Path(name_or_path)
     if path.is_file():
         return path
     own = FOLDER / f"{name_or_path}.yaml"
     if str(name_or_path) in shipped():
         return own
-    raise HydraulicControlError(
+    raise ControlError(
         f"{name_or_path}: no such parameter file; shipped are {', '.join(shipped()) or 'none'}, or give a path"
     )
 
@@ -46,20 +46,20 @@ def find(name_or_path: str | Path) -> Path:
 def load(name_or_path: str | Path) -> dict[str, Any]:
     """Parameters of the controller in a file, checked; not all need to be there.
 
-    Raises `HydraulicControlError` for a file that is no such file, and for values that are not allowed.
+    Raises `ControlError` for a file that is no such file, and for values that are not allowed.
     """
     path = find(name_or_path)
     try:
         document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, YAMLError) as error:
-        raise HydraulicControlError(f"{path}: cannot be read: {error}") from None
+        raise ControlError(f"{path}: cannot be read: {error}") from None
     rows = document.get(NODE, {}).get("ros__parameters") if isinstance(document, dict) else None
     if not isinstance(rows, dict):
-        raise HydraulicControlError(f"{path}: has no {NODE} with ros__parameters")
+        raise ControlError(f"{path}: has no {NODE} with ros__parameters")
     try:
         return {name: check(name, value) for name, value in _flat(rows).items() if name not in ("use_sim_time",)}
-    except HydraulicControlError as error:
-        raise HydraulicControlError(f"{path}: {error}") from None
+    except ControlError as error:
+        raise ControlError(f"{path}: {error}") from None
 
 
 def text(values: Mapping[str, Any], remarks: str) -> str:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hydraulic_control.compiled_loop import linear
 from hydraulic_control.controller import Controller
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 
 NAN = float("nan")
 _APART = 1e-9
@@ -107,19 +107,19 @@ def from_coefficients(
     """Model of a transfer function in descending powers of z (sampled every ``sampling_time`` [s]), or of s where that
     is None or 0.
 
-    Raises `HydraulicControlError` for coefficients that are no proper transfer function, and for repeated poles.
+    Raises `ControlError` for coefficients that are no proper transfer function, and for repeated poles.
     """
     num, den = (np.trim_zeros(np.atleast_1d(np.asarray(c, dtype=float)), "f") for c in (numerator, denominator))
     if not (len(num) and len(den) >= 2 and len(num) <= len(den) and np.isfinite([*num, *den]).all()):
-        raise HydraulicControlError(
+        raise ControlError(
             f"{name}: numerator {list(num)} over denominator {list(den)} is no proper transfer function with poles"
         )
     if not (math.isfinite(delay) and delay >= 0.0):
-        raise HydraulicControlError(f"{name}: the delay is {delay} s; it must not be negative")
+        raise ControlError(f"{name}: the delay is {delay} s; it must not be negative")
     poles = np.roots(den).astype(complex)
     distances = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(len(poles), np.inf))
     if distances.min() < _APART * max(1.0, float(np.abs(poles).max())):
-        raise HydraulicControlError(f"{name}: has a repeated pole ({poles}); only simple poles can be taken apart")
+        raise ControlError(f"{name}: has a repeated pole ({poles}); only simple poles can be taken apart")
     direct = float(num[0] / den[0]) if len(num) == len(den) else 0.0
     residues = (np.polyval(num, poles) / np.polyval(np.polyder(den), poles)).astype(complex)
     if not sampling_time:
@@ -136,7 +136,7 @@ def _continuous(z: NDArray, residues: NDArray, period: float, name: str) -> tupl
     slow = np.abs(z - 1.0) < _APART
     gain = np.where(slow, 1.0 / period, s / np.where(slow, 1.0, z - 1.0))
     if not np.isfinite(period) or period < 0.0:
-        raise HydraulicControlError(f"{name}: the sampling time is {period} s; it must be positive")
+        raise ControlError(f"{name}: the sampling time is {period} s; it must be positive")
     return s, residues * gain
 
 
@@ -144,15 +144,15 @@ def load_identified(path: Path | str) -> IdentifiedModel:
     """Model in a file that ``hydraulic_sysid identify`` writes (linear_model.json, or identify.json), or in any JSON
     file with numerator, denominator, sampling_time [s], domain (discrete or continuous) and, if it has one, delay [s].
 
-    Raises `HydraulicControlError` for a file that cannot be read or holds no transfer function from V to m.
+    Raises `ControlError` for a file that cannot be read or holds no transfer function from V to m.
     """
     file = Path(path)
     try:
         document: Any = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
-        raise HydraulicControlError(f"{file}: cannot be read ({error.strerror})") from None
+        raise ControlError(f"{file}: cannot be read ({error.strerror})") from None
     except ValueError as error:
-        raise HydraulicControlError(f"{file}: not a JSON document ({error})") from None
+        raise ControlError(f"{file}: not a JSON document ({error})") from None
     try:
         _check_units(file, document)
         form = document
@@ -163,7 +163,7 @@ def load_identified(path: Path | str) -> IdentifiedModel:
         name = file.absolute().parent.name if file.stem in _COMMON_NAMES else file.stem
         return from_coefficients(form["numerator"], form["denominator"], period, form.get("delay") or 0.0, name)
     except (AttributeError, KeyError, TypeError) as error:
-        raise HydraulicControlError(f"{file}: holds no transfer function ({error})") from None
+        raise ControlError(f"{file}: holds no transfer function ({error})") from None
 
 
 def _check_units(file: Path, document: dict[str, Any]) -> None:
@@ -171,4 +171,4 @@ def _check_units(file: Path, document: dict[str, Any]) -> None:
     for side, unit in (("input", "V"), ("output", "m")):
         found = settings.get(side, {}).get("unit", unit)
         if found != unit:
-            raise HydraulicControlError(f"{file}: its {side} is in {found}; a position loop needs one in {unit}")
+            raise ControlError(f"{file}: its {side} is in {found}; a position loop needs one in {unit}")

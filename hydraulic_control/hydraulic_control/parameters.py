@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
@@ -69,21 +69,21 @@ def default_values() -> dict[str, Any]:
 def check(name: str, value: Any) -> Any:
     """`value` of the parameter of that name, in its type.
 
-    :raises HydraulicControlError: unknown name, wrong type, not finite, out of range, none of the choices.
+    :raises ControlError: unknown name, wrong type, not finite, out of range, none of the choices.
     """
     if name not in SPECS:
-        raise HydraulicControlError(f"{name!r} is no parameter of the controller; there are {', '.join(SPECS)}")
+        raise ControlError(f"{name!r} is no parameter of the controller; there are {', '.join(SPECS)}")
     try:
         checked = SPECS[name].check(value)
     except ValueError as error:
-        raise HydraulicControlError(str(error)) from None
+        raise ControlError(str(error)) from None
     if name in CHOICES and checked not in CHOICES[name]:
-        raise HydraulicControlError(f"{name} is {checked!r}; allowed are {', '.join(CHOICES[name])}")
+        raise ControlError(f"{name} is {checked!r}; allowed are {', '.join(CHOICES[name])}")
     return checked
 
 
 def complete(values: Mapping[str, Any]) -> dict[str, Any]:
-    """All parameters: `values` where given, else defaults. Raises `HydraulicControlError` as `check` does."""
+    """All parameters: `values` where given, else defaults. Raises `ControlError` as `check` does."""
     return default_values() | {name: check(name, value) for name, value in values.items()}
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ def design(
     """Polynomials that place the closed loop's poles at (frequency [rad/s], damping) and the observer's at two equal
     real ones.
 
-    Raises `HydraulicControlError` where the poles lie too high for the period, or the model cannot be solved for.
+    Raises `ControlError` where the poles lie too high for the period, or the model cannot be solved for.
     """
     if max(frequency, observer) * period > math.pi:
-        raise HydraulicControlError(
+        raise ControlError(
             f"pole_placement: {max(frequency, observer):g} rad/s is above the Nyquist frequency of the period "
             f"{period:g} s ({math.pi / period:g} rad/s)"
         )
@@ -73,7 +73,7 @@ def design(
     try:
         rho, s0, s1, s2 = np.linalg.solve(matrix[1:], rest[1:])
     except np.linalg.LinAlgError as error:
-        raise HydraulicControlError(f"pole_placement: the model cannot be placed: {error}") from None
+        raise ControlError(f"pole_placement: the model cannot be placed: {error}") from None
     r = np.polymul([1.0, -1.0], [1.0, rho])
     t0 = np.polyval(wanted, 1.0) / np.polyval(b, 1.0)
     return Polynomials(float(t0), float(s0), float(s1), float(s2), float(r[1]), float(r[2]), seen[1], seen[2])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.response import Response
 from hydraulic_control.trajectories import Limits, Trajectory, approach, make
 from hydraulic_interfaces.samples import PlantSample, Reference
@@ -19,7 +19,7 @@ _LONGEST = 4_000_000  # samples kept
 class ReferenceRun:
     """Answers every state with a reference until the trajectory has been played, and keeps the response.
 
-    Raises `HydraulicControlError` for a trajectory that is not possible within the limits.
+    Raises `ControlError` for a trajectory that is not possible within the limits.
     """
 
     def __init__(self, kind: str, settings: Mapping[str, Any], limits: Limits) -> None:
@@ -42,7 +42,7 @@ class ReferenceRun:
             return None
         if self._whole is None:
             if abs(sample.position) > self._limits.travel:
-                raise HydraulicControlError(
+                raise ControlError(
                     f"the piston is at {sample.position:.4g} m, outside the travel of ±{self._limits.travel:g} m"
                 )
             self._whole = approach(sample.position, self._own, self._limits)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 
 _DRIFT_GAIN = 0.2  # of the relay's amplitude: how far its centre may follow a drift
@@ -48,7 +48,7 @@ class RelaySettings:
         for name, (low, high, unit) in ranges.items():
             value = getattr(self, name)
             if not (math.isfinite(value) and low <= value <= high):
-                raise HydraulicControlError(f"relay {name} is {value:g} {unit}, must be {low:g} … {high:g} {unit}")
+                raise ControlError(f"relay {name} is {value:g} {unit}, must be {low:g} … {high:g} {unit}")
 
 
 @dataclass(frozen=True)
@@ -144,12 +144,12 @@ class Relay:
 def measure(plant: Any, settings: RelaySettings, dt: float = 1e-3) -> CriticalPoint:
     """Run the experiment on a plant in this process (`simulation.LoopPlant`).
 
-    Raises `HydraulicControlError` where it was broken off.
+    Raises `ControlError` where it was broken off.
     """
     relay, drive = Relay(settings), 0.0
     while not relay.done:
         position, _, _ = plant.step(drive, dt)
         drive = relay.step(dt, position)
     if relay.result is None:
-        raise HydraulicControlError(f"relay experiment: {relay.trouble}")
+        raise ControlError(f"relay experiment: {relay.trouble}")
     return relay.result

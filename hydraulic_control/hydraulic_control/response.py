@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 
 Array = NDArray[np.float64]
 BAND = 0.02
@@ -36,16 +36,16 @@ class Response:
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Response:
-        """The response in such a document. Raises `HydraulicControlError` where a column is missing or too short."""
+        """The response in such a document. Raises `ControlError` where a column is missing or too short."""
         columns = {}
         for field in fields(cls):
             try:
                 columns[field.name] = np.array(document[field.name], dtype=float)
             except (KeyError, TypeError, ValueError):
-                raise HydraulicControlError(f"a response needs numbers for {field.name!r}") from None
+                raise ControlError(f"a response needs numbers for {field.name!r}") from None
         sizes = {len(column) for column in columns.values()}
         if len(sizes) != 1 or sizes.pop() < 10:
-            raise HydraulicControlError("a response needs at least 10 samples, the same number of each column")
+            raise ControlError("a response needs at least 10 samples, the same number of each column")
         return cls(**columns)
 
 
@@ -70,12 +70,12 @@ class StepFigures:
 def step_figures(response: Response) -> StepFigures:
     """Figures of the only step in the reference; before it the loop rests.
 
-    The steady state is the mean over the last tenth. Raises `HydraulicControlError` where the reference does not step
+    The steady state is the mean over the last tenth. Raises `ControlError` where the reference does not step
     exactly once, or nothing comes after it.
     """
     jumps = np.flatnonzero(np.diff(response.reference) != 0.0)
     if len(jumps) != 1:
-        raise HydraulicControlError(f"the reference changes {len(jumps)} times; figures of a step need exactly one")
+        raise ControlError(f"the reference changes {len(jumps)} times; figures of a step need exactly one")
     first = int(jumps[0]) + 1
     t, x, u = (c[first:] for c in (response.time, response.position, response.drive))
     start, goal = response.reference[first - 1], response.reference[first]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.relay import CriticalPoint
 
 
@@ -45,11 +45,11 @@ def pole_placement(velocity_gain: float, lag: float, frequency: float, damping: 
     """Poles of the loop around K/(s(Ts + 1)) at ``frequency`` [rad/s] with ``damping`` and at a tenth of it, [3].
 
     T·s³ + (1 + K·Kd)·s² + K·Kp·s + K·Ki = T'·(s + ω/10)(s² + 2ζω·s + ω²) with the derivative left out where the lag
-    alone is too short to need it: the gains that are negative are 0. Raises `HydraulicControlError` for values that are
+    alone is too short to need it: the gains that are negative are 0. Raises `ControlError` for values that are
     not positive.
     """
     if not min(velocity_gain, lag, frequency, damping) > 0.0:
-        raise HydraulicControlError(
+        raise ControlError(
             f"pole placement: gain {velocity_gain:g}, lag {lag:g}, frequency {frequency:g} and damping {damping:g} "
             "must be positive"
         )

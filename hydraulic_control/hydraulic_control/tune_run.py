@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hydraulic_control import rules
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import IdentifiedModel
 from hydraulic_control.margins import critical_of_identified, critical_of_model
 from hydraulic_control.relay import CriticalPoint, RelaySettings, measure
@@ -53,7 +53,7 @@ def critical_points(
         point, remark = None, f"±{relay.amplitude:g} V"
         try:
             point = measure(SimulatedPlant(model, noise), relay)
-        except HydraulicControlError as error:
+        except ControlError as error:
             remark = str(error)
         found.append(Found("relay on the plant", point, remark))
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from hydraulic_control.controller import Controller
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.parameters import SPECS
 from hydraulic_control.response import Response, StepFigures, step_figures
 from hydraulic_control.scenario import Case
@@ -54,7 +54,7 @@ class Criteria:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not (math.isfinite(value) and value > 0.0):
-                raise HydraulicControlError(f"criterion {name} is {value:g}; it must be positive and finite")
+                raise ControlError(f"criterion {name} is {value:g}; it must be positive and finite")
 
     def cost(self, figures: StepFigures, step: float) -> float:
         """Of one step of ``step`` [m]; a tenth where the goals are just met, never more than `_HOPELESS` a figure."""
@@ -132,13 +132,13 @@ def optimise(
     """Better values than ``start`` for those that are free (by default what `FREE` says of its law).
 
     Nelder–Mead on the logarithms, begun twice: the second time from where the first one stopped, which frees a simplex
-    that has shrunk too early. Raises `HydraulicControlError` for a start or free names that are not allowed.
+    that has shrunk too early. Raises `ControlError` for a start or free names that are not allowed.
     """
     law = Controller(start).values["controller"]
     names = tuple(FREE[law] if free is None else free)
     for name in names:
         if name not in SPECS or not isinstance(SPECS[name].default, float):
-            raise HydraulicControlError(f"{name!r} cannot be optimised; numbers are {', '.join(FREE[law])} …")
+            raise ControlError(f"{name!r} cannot be optimised; numbers are {', '.join(FREE[law])} …")
     first = {name: max(float(start.get(name, SPECS[name].default)), FLOOR.get(name, 1e-9)) for name in names}
     best: dict[str, Any] = dict(start)
     lowest = before = cost_of(start, cases, steps, criteria, duration)
@@ -150,7 +150,7 @@ def optimise(
         values = dict(start) | {n: _inside(n, first[n] * math.exp(v)) for n, v in zip(names, x.tolist(), strict=True)}
         try:
             now = cost_of(values, cases, steps, criteria, duration)
-        except HydraulicControlError:  # poles that its period cannot have
+        except ControlError:  # poles that its period cannot have
             return 2.0 * _HOPELESS
         if now < lowest:
             best, lowest = values, now

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-
-class HydraulicSimError(Exception):
-    """Base of every error of this package."""
+from hydraulic_interfaces.errors import HydraulicError
 
 
-class EffectError(HydraulicSimError, ValueError):
+class EffectError(HydraulicError, ValueError):
     """An effect file is incomplete or contradicts itself or the composition it joins."""
 
 
-class ModelError(HydraulicSimError, ValueError):
+class ModelError(HydraulicError, ValueError):
     """A model file, or a value put into a model, is not acceptable."""
 
 
-class SimulationError(HydraulicSimError, RuntimeError):
+class SimulationError(HydraulicError, RuntimeError):
     """A simulation left the numbers: NaN or infinity, or a step that cannot follow the physics."""

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 GROUND = {"hydraulic_interfaces", "hydraulic_node_utils"}
 BELOW: dict[str, set[str]] = {
     "hydraulic_interfaces": set(),
-    "hydraulic_node_utils": set(),
+    "hydraulic_node_utils": {"hydraulic_interfaces"},
     "hydraulic_plant_node": GROUND,
     "hydraulic_sim": {*GROUND, "hydraulic_plant_node"},
     "hydraulic_sysid": {*GROUND, "hydraulic_sim"},

@@ -14,8 +14,8 @@ from hydraulic_can_driver.bus import Address, Bus, SdoWrite
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_can_driver.can_bus import open_can
 from hydraulic_can_driver.cia408 import State
-from hydraulic_can_driver.errors import CanDriverError
 from hydraulic_can_driver.virtual import Reading, VirtualBench
+from hydraulic_interfaces.errors import HydraulicError
 
 _channels = itertools.count()
 
@@ -62,7 +62,7 @@ class Rig:
         assert self.loop is not None
         self.loop.ending = True
         self.loop.join()
-        with contextlib.suppress(CanDriverError):
+        with contextlib.suppress(HydraulicError):
             self.bench.stop()
         if boot:
             self.bench.boot()
@@ -86,7 +86,7 @@ class Rig:
         if self.loop is not None:
             self.loop.ending = True
             self.loop.join()
-        with contextlib.suppress(CanDriverError):
+        with contextlib.suppress(HydraulicError):
             self.bench.close()
         self.devices.stop()
         self._line.shutdown()

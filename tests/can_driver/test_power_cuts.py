@@ -17,8 +17,8 @@ from can_driver.rigs import Rig, patient_bus, rig_on
 
 from hydraulic_can_driver import master
 from hydraulic_can_driver.cia408 import State
-from hydraulic_can_driver.errors import CanDriverError
 from hydraulic_can_driver.virtual import faults as upset
+from hydraulic_interfaces.errors import HydraulicError
 
 # When it happens: kind, device and detail of an event in the devices, and which occurrence of it.
 STEPS = {
@@ -66,14 +66,14 @@ class Life(threading.Thread):
         here = self.here
         try:
             self.go_through()
-        except CanDriverError as error:
+        except HydraulicError as error:
             self.problem = str(error)
         if here.loop is not None:
             here.loop.ending = True
             here.loop.join()
         try:
             here.bench.stop()
-        except CanDriverError as error:
+        except HydraulicError as error:
             self.problem = self.problem or str(error)
 
     def go_through(self) -> None:

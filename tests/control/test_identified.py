@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from hydraulic_control.controller import Controller
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import from_coefficients, load_identified
 from hydraulic_control.margins import critical_of_identified, critical_of_model, critical_point, grid
 from hydraulic_control.simulation import run, step_reference
@@ -112,7 +112,7 @@ def test_files(tmp_path: Path) -> None:
         (json.dumps({**form, "sampling_time": -0.1}), "sampling time"),
     ):
         flat.write_text(text)
-        with pytest.raises(HydraulicControlError, match=complaint):
+        with pytest.raises(ControlError, match=complaint):
             load_identified(flat)
-    with pytest.raises(HydraulicControlError, match="cannot be read"):
+    with pytest.raises(ControlError, match="cannot be read"):
         load_identified(tmp_path / "none.json")

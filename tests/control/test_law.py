@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hydraulic_control import pole_placement
 from hydraulic_control.controller import Controller
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.kernel import nonlinear_gain
 from hydraulic_control.parameters import CONTROLLERS, LAW
 
@@ -160,7 +160,7 @@ def test_what_is_refused_names_the_value_and_changes_nothing() -> None:
         ({"antiwindup": "some"}, "conditional_integration"),
         ({"kp": 5.0, "pole_placement.period": 0.5}, "Nyquist"),
     ):
-        with pytest.raises(HydraulicControlError, match=complaint):
+        with pytest.raises(ControlError, match=complaint):
             law.set(values)
     assert law.values["kp"] == Controller().values["kp"]
     assert settled(law, 0.01) == settled(Controller(), 0.01)

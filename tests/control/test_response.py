@@ -8,7 +8,7 @@ import control
 import numpy as np
 import pytest
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.response import Response, step_figures, tracking_figures
 
 
@@ -41,7 +41,7 @@ def test_what_is_not_reached_is_infinite() -> None:
 def test_a_reference_that_does_not_step_once_has_no_figures() -> None:
     time = np.arange(100) * 1e-3
     for reference in (np.zeros(100), np.sin(time)):
-        with pytest.raises(HydraulicControlError, match="exactly one"):
+        with pytest.raises(ControlError, match="exactly one"):
             step_figures(Response(time, reference, reference, reference))
 
 
@@ -59,5 +59,5 @@ def test_documents() -> None:
     assert again.position == pytest.approx(response.position)
     document = response.as_document()
     for broken in ({**document, "drive": document["drive"][1:]}, {**document, "time": "x"}, {"time": [1.0]}):
-        with pytest.raises(HydraulicControlError):
+        with pytest.raises(ControlError):
             Response.from_document(broken)

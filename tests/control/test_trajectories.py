@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.trajectories import KINDS, Limits, approach, make
 
 SETTINGS = {"offset": 0.01, "amplitude": 0.05, "frequency": 0.5, "cycles": 3, "levels": 4, "dwell": 1.0, "file": ""}
@@ -35,7 +35,7 @@ def test_what_is_not_refused_is_smooth_and_within_the_limits(
     limits = Limits(0.5, velocity, acceleration)
     try:
         trajectory = make(kind, {**SETTINGS, "amplitude": amplitude, "frequency": frequency}, limits)
-    except HydraulicControlError:
+    except ControlError:
         return
     if trajectory.duration > 100.0:
         return
@@ -77,7 +77,7 @@ def test_the_shapes() -> None:
     ],
 )
 def test_what_leaves_the_limits_is_refused(kind: str, changed: dict[str, float], complaint: str) -> None:
-    with pytest.raises(HydraulicControlError, match=complaint):
+    with pytest.raises(ControlError, match=complaint):
         make(kind, {**SETTINGS, **changed}, Limits(0.5, 0.3, 5.0))
 
 
@@ -93,7 +93,7 @@ def test_playback(tmp_path: Path) -> None:
     head = "time_s,position_m\n"
     for text in (head + "0,0\n", "t,x\n0,0\n1,1\n", head + "1,0\n0,1\n", head + "0,a\n1,0\n"):
         file.write_text(text)
-        with pytest.raises(HydraulicControlError, match="needs"):
+        with pytest.raises(ControlError, match="needs"):
             make("playback", {**SETTINGS, "file": str(file)}, Limits())
 
 

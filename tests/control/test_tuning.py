@@ -12,7 +12,7 @@ import pytest
 
 from hydraulic_control import evaluation, gains_file, rules
 from hydraulic_control.controller import Controller
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import from_coefficients
 from hydraulic_control.margins import critical_point, grid
 from hydraulic_control.parameters import CONTROLLERS
@@ -74,7 +74,7 @@ def test_the_relay_ends_at_its_limits(settings: RelaySettings, positions: list[f
 
 def test_relay_settings_have_ranges() -> None:
     for wrong in ({"amplitude": 11.0}, {"cycles": 1}, {"travel": math.inf}, {"time_limit": 0.0}):
-        with pytest.raises(HydraulicControlError, match=next(iter(wrong))):
+        with pytest.raises(ControlError, match=next(iter(wrong))):
             RelaySettings(**wrong)  # type: ignore[arg-type]
 
 
@@ -94,7 +94,7 @@ def test_placed_gains_place_the_poles(lag: float) -> None:
         wanted = [-1.5, *np.roots([1.0, 24.0, 225.0])]
         assert sorted(np.abs(poles)) == pytest.approx(sorted(np.abs(wanted)), rel=1e-6)
     assert np.all(poles.real < 0.0)
-    with pytest.raises(HydraulicControlError, match="positive"):
+    with pytest.raises(ControlError, match="positive"):
         rules.pole_placement(0.04, lag, -1.0)
 
 
@@ -106,7 +106,7 @@ def test_optimising_lowers_the_cost_and_keeps_what_is_not_free() -> None:
     assert tuned.cost == cost_of(tuned.values, cases, [0.05], Criteria(), 0.8)
     assert tuned.values["tracking_time"] == 0.3
     assert tuned.trials <= 40
-    with pytest.raises(HydraulicControlError, match="cannot be optimised"):
+    with pytest.raises(ControlError, match="cannot be optimised"):
         optimise(start, cases, [0.05], Criteria(), ["antiwindup"])
 
 
@@ -114,7 +114,7 @@ def test_criteria() -> None:
     good = figures_of(try_step(gains_file.load("npid"), nominal(MODEL, QUIET), 0.05, 1.5))
     assert good is not None
     assert Criteria().cost(good, 0.05) < 0.2 < Criteria(rise=0.01).cost(good, 0.05)
-    with pytest.raises(HydraulicControlError, match="rise"):
+    with pytest.raises(ControlError, match="rise"):
         Criteria(rise=0.0)
 
 
@@ -179,9 +179,9 @@ def test_gains_files(tmp_path: Path) -> None:
         ("/actuator/controller:\n  ros__parameters:\n    speed: 1.0\n", "no parameter"),
     ):
         file.write_text(text)
-        with pytest.raises(HydraulicControlError, match=complaint):
+        with pytest.raises(ControlError, match=complaint):
             gains_file.load(file)
-    with pytest.raises(HydraulicControlError, match="shipped are"):
+    with pytest.raises(ControlError, match="shipped are"):
         gains_file.load("turbo")
 
 

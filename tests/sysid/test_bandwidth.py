@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hydraulic_node_utils.cli import run_verb
 from hydraulic_sim.linear import closed_form
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.__main__ import main
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import load_plan
 from hydraulic_sysid.linear.bandwidth import BandwidthError, from_model, from_record, from_rehearsal, from_response
@@ -99,10 +99,10 @@ def test_friction_damps_what_a_probe_sees() -> None:
 
 
 def test_the_verb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bandwidth", "--model", BENCH, "--out", str(tmp_path / "b")]) == 0
+    assert run_verb("hydraulic_sysid", ["bandwidth", "--model", BENCH, "--out", str(tmp_path / "b")]) == 0
     document = json.loads((tmp_path / "b" / "bandwidth.json").read_text())
     assert document["position_bandwidth"] == pytest.approx(from_model(load_model(BENCH)).position)
     assert document["excitation_band"][1] == pytest.approx(2.0 * document["position_bandwidth"])
     assert "position, closed loop" in capsys.readouterr().out
-    assert main(["bandwidth", "--out", str(tmp_path / "c")]) == 2
+    assert run_verb("hydraulic_sysid", ["bandwidth", "--out", str(tmp_path / "c")]) == 2
     assert "either a --model or a --record" in capsys.readouterr().err

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hydraulic_node_utils.cli import run_verb
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.__main__ import main
 from hydraulic_sysid.excitation import ExcitationError, ExcitationRun, Phase, Plan, load_plan
 from hydraulic_sysid.excitation.amplitude import Limits, largest
 from hydraulic_sysid.excitation.design import SIGNALS, Wish, propose
@@ -142,7 +142,7 @@ def test_without_an_approach_a_run_is_as_before() -> None:
 def test_the_plan_file_holds_its_prediction(model, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:  # noqa: ANN001
     arguments = ["design", "low_crest_multisine", "--model", BENCH, "--band", "0.5", "10", "--duration", "9"]
     out = tmp_path / "design"
-    assert main([*arguments, "--travel", "0.05", "--out", str(out)]) == 0
+    assert run_verb("hydraulic_sysid", [*arguments, "--travel", "0.05", "--out", str(out)]) == 0
     text = capsys.readouterr().out
     plan = load_plan(out / "low_crest_multisine.yaml")
     assert plan.prediction is not None and plan.prediction.model == BENCH
@@ -153,14 +153,15 @@ def test_the_plan_file_holds_its_prediction(model, tmp_path: Path, capsys: pytes
     document = json.loads((out / "design.json").read_text())
     assert document["limits"]["travel"] == 0.05
     assert document["plans"][0]["crest_factor"] < 2.0
-    assert main([*arguments, "--out", str(out)]) == 2
+    assert run_verb("hydraulic_sysid", [*arguments, "--out", str(out)]) == 2
     assert "a plan is never overwritten" in capsys.readouterr().err
 
 
 def test_realisations_have_one_amplitude_and_phases_of_their_own(tmp_path: Path) -> None:
     out = tmp_path / "three"
     arguments = ["--band", "0.5", "10", "--duration", "9", "--part", "0.3", "--realisations", "2"]
-    assert main(["design", "odd_random_phase_multisine", "--model", BENCH, *arguments, "--out", str(out)]) == 0
+    arguments = ["design", "odd_random_phase_multisine", "--model", BENCH, *arguments, "--out", str(out)]
+    assert run_verb("hydraulic_sysid", arguments) == 0
     one, two = (load_plan(out / f"odd_random_phase_multisine_{n}.yaml") for n in (1, 2))
     assert one.signal.size == pytest.approx(two.signal.size, rel=1e-6)
     np.testing.assert_array_equal(one.signal.lines(), two.signal.lines())  # type: ignore[attr-defined]
@@ -169,9 +170,9 @@ def test_realisations_have_one_amplitude_and_phases_of_their_own(tmp_path: Path)
 
 def test_a_band_below_what_the_duration_holds_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["design", "chirp", "--model", "sample_bench", "--duration", "10", "--out"]
-    assert main([*arguments, str(tmp_path / "short")]) == 0
+    assert run_verb("hydraulic_sysid", [*arguments, str(tmp_path / "short")]) == 0
     assert "periods of the lowest frequency: play it longer" in " ".join(capsys.readouterr().out.split())
     # With friction, which a probe sees, the same actuator is much better damped.
-    assert main([*arguments, str(tmp_path / "probed"), "--probe", "probe"]) == 0
+    assert run_verb("hydraulic_sysid", [*arguments, str(tmp_path / "probed"), "--probe", "probe"]) == 0
     low, wide = (json.loads((tmp_path / n / "design.json").read_text())["bandwidth"] for n in ("short", "probed"))
     assert wide > 2.0 * low

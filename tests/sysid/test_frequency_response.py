@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from hydraulic_sysid.__main__ import main
+from hydraulic_node_utils.cli import run_verb
 from hydraulic_sysid.data.records import Record, save_csv
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.signals.odd_random_phase_multisine import OddRandomPhaseMultisine
@@ -215,11 +215,12 @@ def test_the_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.Captur
     one = record(plan, linear, 1e-3)
     file = save_csv(Record.sampled("r", DT, {"drive": one["drive"], "position": one["position"]}), tmp_path / "r.csv")
     arguments = ["frequency_response", "--record", str(file)]
-    assert main([*arguments, "--period", "2", "--start", "1", "--out", str(tmp_path / "bla")]) == 0
-    assert main([*arguments, "--out", str(tmp_path / "welch")]) == 0
+    periodic = ["--period", "2", "--start", "1", "--out", str(tmp_path / "bla")]
+    assert run_verb("hydraulic_sysid", [*arguments, *periodic]) == 0
+    assert run_verb("hydraulic_sysid", [*arguments, "--out", str(tmp_path / "welch")]) == 0
     documents = [json.loads((tmp_path / n / "frequency_response.json").read_text()) for n in ("bla", "welch")]
     assert [d["method"] for d in documents] == ["bla", "welch"]
     assert documents[1]["levels_db"] is None
     assert "Plotly" in (tmp_path / "bla" / "report.html").read_text(encoding="utf-8")
-    assert main([*arguments, "--output", "pressure_a", "--out", str(tmp_path / "none")]) == 2
+    assert run_verb("hydraulic_sysid", [*arguments, "--output", "pressure_a", "--out", str(tmp_path / "none")]) == 2
     assert "no channel 'pressure_a'" in capsys.readouterr().err

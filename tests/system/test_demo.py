@@ -208,7 +208,7 @@ def test_a_node_that_dies_fails_its_step_and_ends_the_run(demo: Any, wait_until:
     os.kill(run.pid_of(f"hydraulic_sysid.nodes.{node}"), signal.SIGKILL)
     code, _, errors = run.finish()
     assert code == 1
-    assert "demo failed at step 'chirp: excite and record'" in errors
+    assert "demo: failed at step 'chirp: excite and record'" in errors
     assert f"process {node}_chirp: it was killed by SIGKILL" in errors
     assert str(run.out / "logs" / f"{node}_chirp.log") in errors
     assert "Traceback" not in errors
@@ -243,7 +243,7 @@ def test_a_plant_that_cannot_start_is_told_at_once(demo: Any, tmp_path: Path) ->
     run = demo("--quick", environment={"PYTHONPATH": os.pathsep.join([str(package.parent), *filter(None, sys.path)])})
     code, _, errors = run.finish()
     assert code == 1
-    assert "demo failed at step 'start the plant'" in errors
+    assert "demo: failed at step 'start the plant'" in errors
     assert "a broken set-up" in errors
     assert run.processes() == {}
 

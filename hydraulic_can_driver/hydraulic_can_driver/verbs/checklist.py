@@ -8,31 +8,25 @@ from pathlib import Path
 
 from hydraulic_can_driver.bus_file import load_bus, shipped
 from hydraulic_can_driver.checklist import checklist
-from hydraulic_can_driver.errors import CanDriverError
+from hydraulic_node_utils import cli
 
 
 def main(argv: list[str] | None = None) -> int:
     """Print the list as Markdown, or write it to a new file; 0, or 2 for an unusable bus file or target."""
-    parser = argparse.ArgumentParser(
-        prog="checklist", description="What to check before the hydraulics of a bench are first switched on."
+    parser = cli.parser(
+        "hydraulic_can_driver checklist", "What to check before the hydraulics of a bench are first switched on."
     )
     parser.add_argument("--bus", default="bench", help=f"bus file, or a shipped one: {', '.join(shipped())}")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write Markdown to this new file")
-    options = parser.parse_args(argv)
-    try:
-        text = checklist(load_bus(options.bus))
-        if options.out is None:
-            print(text, end="")
-        else:
-            with options.out.open("x", encoding="utf-8") as file:
-                file.write(text)
-    except FileExistsError:
-        print(f"checklist: {options.out} exists; name a new file", file=sys.stderr)
-        return 2
-    except (CanDriverError, OSError) as error:
-        print(f"checklist: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return cli.run(parser, _checklist, argv)
+
+
+def _checklist(options: argparse.Namespace) -> None:
+    text = checklist(load_bus(options.bus))
+    if options.out is None:
+        print(text, end="")
+    else:
+        cli.new_path(options.out, hint="name a new file").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

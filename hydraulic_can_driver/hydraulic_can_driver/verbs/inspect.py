@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from contextlib import closing
 from dataclasses import replace
 
 from rich.console import Console
@@ -16,39 +17,31 @@ from rich.table import Table
 from hydraulic_can_driver import readback
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus_file import load_bus, shipped
-from hydraulic_can_driver.errors import BusFileError, CanDriverError
+from hydraulic_node_utils import cli
 
 
 def main(argv: list[str] | None = None) -> int:
     """Print the settings of all devices. Exit code 0; 1 when a device does not answer as it should; 2 bad usage."""
-    parser = argparse.ArgumentParser(prog="inspect", description="Read back the settings of the devices on the bus.")
+    parser = cli.parser("hydraulic_can_driver inspect", "Read back the settings of the devices on the bus.")
     parser.add_argument(
         "--bus", default="bench", metavar="F", help=f"bus file, or a shipped one: {', '.join(shipped())}"
     )
     parser.add_argument("--interface", default="", metavar="I", help="python-can interface; default: that of the file")
     parser.add_argument("--channel", default="", metavar="C", help="its channel; default: that of the file")
     parser.add_argument("--json", action="store_true", help="print JSON, as it is kept with a record")
-    options = parser.parse_args(argv)
-    try:
-        bus = load_bus(options.bus)
-        bus = replace(bus, interface=options.interface or bus.interface, channel=options.channel or bus.channel)
-        bench = Bench(bus)
-        try:
-            bench.inspect()
-        finally:
-            bench.close()
-    except BusFileError as error:
-        print(f"inspect: {error}", file=sys.stderr)
-        return 2
-    except CanDriverError as error:
-        print(f"inspect: {error}", file=sys.stderr)
-        return 1
+    return cli.run(parser, _inspect, argv)
+
+
+def _inspect(options: argparse.Namespace) -> None:
+    bus = load_bus(options.bus)
+    bus = replace(bus, interface=options.interface or bus.interface, channel=options.channel or bus.channel)
+    with closing(Bench(bus)) as bench:
+        bench.inspect()
     found = readback.description(bus, bench.readings)
     if options.json:
         print(json.dumps(found, indent=2))
     else:
         _show(found)
-    return 0
 
 
 def _show(found: dict) -> None:

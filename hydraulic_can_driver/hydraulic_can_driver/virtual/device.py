@@ -15,6 +15,7 @@ import can
 import canopen
 
 from hydraulic_can_driver.bus import Node
+from hydraulic_can_driver.errors import CodecError
 from hydraulic_can_driver.virtual.objects import Objects
 from hydraulic_can_driver.virtual.pdo import check_write
 from hydraulic_can_driver.virtual.plant import Reading
@@ -195,15 +196,15 @@ class Device:
     def store(self, index: int, sub: int, value: int) -> None:
         """Set a parameter as with the maker's tool: it holds now and after every power-on.
 
-        :raises ValueError: there is no such object, or the value does not fit.
+        :raises CodecError: there is no such object, or the value does not fit.
         """
         found = self.objects.find(index, sub)
         if found is None:
-            raise ValueError(f"{self.name} has no object 0x{index:04X}:{sub}")
+            raise CodecError(f"{self.name} has no object 0x{index:04X}:{sub}")
         try:
             data = found.encode_raw(value)
         except (struct.error, canopen.ObjectDictionaryError) as error:
-            raise ValueError(f"{self.name}, 0x{index:04X}:{sub} cannot be {value}: {error}") from None
+            raise CodecError(f"{self.name}, 0x{index:04X}:{sub} cannot be {value}: {error}") from None
         with self.wiring.lock:
             self.stored[index, sub] = value
             if self.node is not None:

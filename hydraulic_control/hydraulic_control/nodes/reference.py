@@ -17,7 +17,7 @@ from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 from hydraulic_control.nodes._reference_parameters import PARAMETERS
 from hydraulic_control.reference_run import ReferenceRun
 from hydraulic_control.trajectories import Limits
@@ -84,7 +84,7 @@ class ReferenceNode(ServedNode):
             self._run, self._armed, self._failed, self._end = self._armed, None, False, ""
         try:
             now = self._run.answer(sample) if self._run is not None else None
-        except HydraulicControlError as error:
+        except ControlError as error:
             self._finish(f"refused: {error}", failed=True)
             return
         if now is not None:
@@ -129,7 +129,7 @@ class ReferenceNode(ServedNode):
             return response
         try:
             self._armed = self._make()
-        except HydraulicControlError as error:
+        except ControlError as error:
             response.message = f"refused: {error}"
             return response
         response.success, response.message = True, f"starting {self._armed.kind}, {self._armed.duration:g} s"

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 
 from ._base import Limits, Trajectory, check
 from .minimum_jerk import MinimumJerk
@@ -35,10 +35,10 @@ def make(kind: str, settings: Mapping[str, Any], limits: Limits) -> Trajectory:
     """The trajectory of that kind, within the limits.
 
     ``settings``: offset [m], amplitude [m], frequency [Hz], cycles, levels, dwell [s], file. Raises
-    `HydraulicControlError` for an unknown kind, or where it would leave the limits.
+    `ControlError` for an unknown kind, or where it would leave the limits.
     """
     if kind not in KINDS:
-        raise HydraulicControlError(f"reference kind is {kind!r}; allowed are {', '.join(KINDS)}")
+        raise ControlError(f"reference kind is {kind!r}; allowed are {', '.join(KINDS)}")
     trajectory = KINDS[kind](settings, limits)
     check(kind, trajectory, limits)
     return trajectory

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 
 _GRID_S = 1e-3
 _LONGEST_GRID = 2_000_000
@@ -39,7 +39,7 @@ class Trajectory(Protocol):
 
 
 def check(name: str, trajectory: Trajectory, limits: Limits) -> None:
-    """Raise `HydraulicControlError` where the trajectory leaves the limits: what, how far, what is allowed.
+    """Raise `ControlError` where the trajectory leaves the limits: what, how far, what is allowed.
 
     A step and a staircase jump: of them only the travel is checked, the actuator goes as fast as it can.
     """
@@ -53,6 +53,6 @@ def check(name: str, trajectory: Trajectory, limits: Limits) -> None:
         found["acceleration"] = (np.max(np.abs(acceleration)), limits.acceleration, "m/s²")
     for what, (value, allowed, unit) in found.items():
         if not value <= allowed * _TOLERANCE:
-            raise HydraulicControlError(
+            raise ControlError(
                 f"{name}: the reference's {what} reaches {value:.4g} {unit}; allowed are {allowed:.4g} {unit}"
             )

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 
 from ._base import Limits
 
@@ -52,18 +52,18 @@ class Playback:
 def read_points(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and positions [m] of a CSV file.
 
-    Raises `HydraulicControlError` for a file that cannot be read, lacks a column, or holds less than two points,
+    Raises `ControlError` for a file that cannot be read, lacks a column, or holds less than two points,
     values that are no numbers, or times that do not increase.
     """
     try:
         with path.open(newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(stream, skipinitialspace=True))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise HydraulicControlError(f"{path}: cannot be read: {error}") from None
+        raise ControlError(f"{path}: cannot be read: {error}") from None
     try:
         points = np.array([[float(row[name]) for name in COLUMNS] for row in rows])
     except (KeyError, TypeError, ValueError):
-        raise HydraulicControlError(f"{path}: needs numbers in the columns {', '.join(COLUMNS)}") from None
+        raise ControlError(f"{path}: needs numbers in the columns {', '.join(COLUMNS)}") from None
     if len(points) < 2 or not np.all(np.isfinite(points)) or not np.all(np.diff(points[:, 0]) > 0.0):
-        raise HydraulicControlError(f"{path}: needs at least two points, finite, with increasing {COLUMNS[0]}")
+        raise ControlError(f"{path}: needs at least two points, finite, with increasing {COLUMNS[0]}")
     return points[:, 0], points[:, 1]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control.errors import ControlError
 
 from ._base import Limits
 
@@ -26,13 +26,13 @@ class Triangle:
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Triangle:
-        """See `make`. Raises `HydraulicControlError` where the acceleration cannot turn it round in time."""
+        """See `make`. Raises `ControlError` where the acceleration cannot turn it round in time."""
         made = cls(
             settings["offset"], settings["amplitude"], settings["frequency"], settings["cycles"], limits.acceleration
         )
         if 16.0 * abs(made.amplitude) * made.frequency**2 > limits.acceleration / 2.0:
             needed = 32.0 * abs(made.amplitude) * made.frequency**2
-            raise HydraulicControlError(
+            raise ControlError(
                 f"triangle: {made.amplitude:g} m at {made.frequency:g} Hz needs {needed:.4g} m/s²; allowed are "
                 f"{limits.acceleration:.4g} m/s²"
             )

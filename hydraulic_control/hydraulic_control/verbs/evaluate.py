@@ -16,13 +16,14 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from hydraulic_control import cli, evaluation, gains_file, paper
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control import evaluation, gains_file, paper
+from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import load_identified
 from hydraulic_control.response import Response
 from hydraulic_control.simulation import QUIET, SensorNoise
 from hydraulic_control.trajectories import KINDS
 from hydraulic_control.tuning import Criteria
+from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import load_model
 
 EPILOG = """\
@@ -36,7 +37,7 @@ SEED = 2026  # of the plants that gains are judged on: not those of tuning
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("evaluate", __doc__.partition("\n")[0], EPILOG)
+    parser = cli.parser("hydraulic_control evaluate", __doc__.partition("\n")[0], EPILOG)
     parser.add_argument(
         "--gains",
         metavar="FILE",
@@ -72,7 +73,7 @@ def _evaluate(options: argparse.Namespace) -> None:
     if options.json:
         print(json.dumps(_finite(results), ensure_ascii=False))
         return
-    console = cli.console()
+    console = tables.console(120)
     for name, result in results.items():
         _print_steps(console, name, result, options.step)
         _print_tracking(console, name, result)
@@ -84,10 +85,10 @@ def _bench(path: Path) -> tuple[str, Response]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise HydraulicControlError(f"{path}: not a JSON document ({error})") from None
+        raise ControlError(f"{path}: not a JSON document ({error})") from None
     kind = document.get("kind") if isinstance(document, dict) else None
     if kind not in KINDS:
-        raise HydraulicControlError(f"{path}: kind is {kind!r}; allowed are {', '.join(KINDS)}")
+        raise ControlError(f"{path}: kind is {kind!r}; allowed are {', '.join(KINDS)}")
     response = Response.from_document(document)
     lost, longest = response.gaps()
     if lost > _TOLD:

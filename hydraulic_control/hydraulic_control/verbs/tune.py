@@ -17,14 +17,15 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from hydraulic_control import cli, gains_file, tune_run
-from hydraulic_control.errors import HydraulicControlError
+from hydraulic_control import gains_file, tune_run
+from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import load_identified
 from hydraulic_control.parameters import CONTROLLERS
 from hydraulic_control.relay import CriticalPoint, RelaySettings
 from hydraulic_control.scenario import nominal, scattered
 from hydraulic_control.simulation import SensorNoise
 from hydraulic_control.tuning import Criteria, Tuned, figures_of, try_step
+from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import load_model
 
 EPILOG = """\
@@ -37,7 +38,7 @@ examples:
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("tune", __doc__.partition("\n")[0], EPILOG)
+    parser = cli.parser("hydraulic_control tune", __doc__.partition("\n")[0], EPILOG)
     parser.add_argument("--controller", choices=CONTROLLERS, default="npid", help="law to tune (default npid)")
     parser.add_argument("--model", metavar="FILE", default="moog_mcr_m_1002_bench", help="model file or preset")
     parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="linear_model.json of identify")
@@ -57,7 +58,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _tune(options: argparse.Namespace) -> None:
-    path = cli.new_file(options.out, options.overwrite)
+    path = cli.new_path(options.out, options.overwrite, "choose another path, or allow --overwrite")
     model = load_model(options.model)
     models = [load_identified(p) for p in options.identified]
     criteria = Criteria(**{name: getattr(options, name) for name in vars(Criteria())})
@@ -78,7 +79,7 @@ def _tune(options: argparse.Namespace) -> None:
     if options.json:
         print(json.dumps(_document(found, gains, tuned), ensure_ascii=False))
         return
-    out = cli.console()
+    out = tables.console(120)
     _print_points(out, found)
     _print_rules(out, gains)
     _print_tuned(out, options, model, tuned, noise)
@@ -90,7 +91,7 @@ def _measured(path: Path) -> CriticalPoint:
         document = json.loads(path.read_text(encoding="utf-8"))
         return CriticalPoint(float(document["critical_gain"]), float(document["critical_period"]))
     except (ValueError, KeyError, TypeError):
-        raise HydraulicControlError(f"{path}: needs numbers for critical_gain and critical_period") from None
+        raise ControlError(f"{path}: needs numbers for critical_gain and critical_period") from None
 
 
 def _remarks(options: argparse.Namespace, tuned: Tuned) -> str:

@@ -4,41 +4,30 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 
 from rich.console import Console
 from rich.table import Table
 
+from hydraulic_node_utils import cli
+
 from .. import slots
 from ..catalogue import describe, parameters_line
-from ..errors import HydraulicSimError
 from ..registry import Library, library
 
 
 def main(argv: list[str] | None = None) -> int:
     """Print the library, or one effect whole. Exit code 0, or 2 for an unknown name or an unusable effect file."""
-    parser = argparse.ArgumentParser(prog="effects", description="List the physical effects a model can have.")
+    parser = cli.parser("hydraulic_sim effects", "List the physical effects a model can have.")
     parser.add_argument("name", nargs="?", help="one effect, shown whole")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
     parser.add_argument("--file", action="append", default=[], metavar="F", help="an effect file of your own as well")
-    options = parser.parse_args(argv)
-    try:
-        found = library(options.file)
-        names = [options.name] if options.name else list(found)
-        records = [describe(found, name) for name in names]
-    except HydraulicSimError as error:
-        print(f"effects: {error}", file=sys.stderr)
-        return 2
-    try:
-        _show(options, found, records)
-        sys.stdout.flush()
-    except BrokenPipeError:  # the reader (head, less) has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0
+    return cli.run(parser, _effects, argv)
 
 
-def _show(options: argparse.Namespace, found: Library, records: list[dict]) -> None:
+def _effects(options: argparse.Namespace) -> None:
+    found = library(options.file)
+    records = [describe(found, name) for name in ([options.name] if options.name else found)]
     if options.json:
         print(json.dumps(records[0] if options.name else records, indent=2, ensure_ascii=False))
     elif options.name:

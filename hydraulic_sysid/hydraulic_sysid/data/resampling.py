@@ -12,13 +12,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hydraulic_sysid.data.errors import RecordError
+
 Array = NDArray[np.float64]
 
 
 def held_average(drive: ArrayLike, dt: float, sampling_time: float) -> Array:
     """Mean over each new sample ``(M,)`` of a drive ``(N,)`` that is held over samples of ``dt`` seconds.
 
-    :raises ValueError: if the new sampling time is shorter than ``dt`` or longer than the record.
+    :raises RecordError: if the new sampling time is shorter than ``dt`` or longer than the record.
     """
     u = np.asarray(drive, dtype=float)
     edges = _instants(u.size, dt, sampling_time, whole=True)
@@ -29,7 +31,7 @@ def held_average(drive: ArrayLike, dt: float, sampling_time: float) -> Array:
 def sampled(output: ArrayLike, dt: float, sampling_time: float) -> Array:
     """An output ``(N,)`` at the beginning of each new sample ``(M,)``, between two samples by a straight line.
 
-    :raises ValueError: if the new sampling time is shorter than ``dt`` or longer than the record.
+    :raises RecordError: if the new sampling time is shorter than ``dt`` or longer than the record.
     """
     y = np.asarray(output, dtype=float)
     return np.interp(_instants(y.size, dt, sampling_time), dt * np.arange(y.size), y)
@@ -38,8 +40,8 @@ def sampled(output: ArrayLike, dt: float, sampling_time: float) -> Array:
 def _instants(count: int, dt: float, sampling_time: float, whole: bool = False) -> Array:
     """Beginnings of the new samples that lie wholly in the record; with ``whole`` the end of the last one too."""
     if sampling_time < dt * (1.0 - 1e-9):
-        raise ValueError(f"sampling time {sampling_time:g} s is shorter than the record's {dt:g} s")
+        raise RecordError(f"sampling time {sampling_time:g} s is shorter than the record's {dt:g} s")
     fits = int(np.floor(count * dt / sampling_time + 1e-9))
     if fits < 1:
-        raise ValueError(f"sampling time {sampling_time:g} s is longer than the record of {count * dt:g} s")
+        raise RecordError(f"sampling time {sampling_time:g} s is longer than the record of {count * dt:g} s")
     return np.arange(fits + (1 if whole else 0), dtype=float) * sampling_time

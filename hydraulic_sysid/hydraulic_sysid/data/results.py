@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from hydraulic_interfaces.errors import HydraulicError
+
 FAMILY = "hydraulic_sysid."
 PAGE = "report.html"
 PAGE_MARK = "<!-- hydraulic_sysid report -->"
@@ -24,7 +26,7 @@ _DIGITS_IN_ARRAYS = 6
 _LONG = 32
 
 
-class ResultError(ValueError):
+class ResultError(HydraulicError, ValueError):
     """A result cannot be read (not there, not JSON, unknown schema) or must not be written over."""
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
@@ -31,7 +32,7 @@ _UPHILL = 1.0  # standard errors from the optimum at which it is no failure that
 _MILD = 3.0  # residual over noise from which a robust loss counts less than the square
 
 
-class CalibrationError(ValueError):
+class CalibrationError(HydraulicError, ValueError):
     """There is nothing to fit, or the data do not allow it; the message says what is needed."""
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.noise import noise_floor, robust_noise_floor
@@ -35,7 +36,7 @@ _VELOCITY = 0.2  # m/s
 _NUMERICAL = 1e-6  # of a channel's range: a noise-free record is not held to less
 
 
-class SegmentError(ValueError):
+class SegmentError(HydraulicError, ValueError):
     """A record cannot be cut (too short, no drive or position)."""
 
 

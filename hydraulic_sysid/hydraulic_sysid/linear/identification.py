@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydraulic_sysid.data.decimation import trace
-from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.records import Record, RecordError
 from hydraulic_sysid.data.resampling import held_average, sampled
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.estimation import metrics
@@ -164,7 +164,7 @@ def _series(record: Record, settings: Settings) -> _Series:
     try:
         u = held_average(record[settings.input], record.dt, settings.sampling_time)
         y = sampled(record[settings.output], record.dt, settings.sampling_time)
-    except ValueError as error:
+    except RecordError as error:
         raise IdentificationError(f"{record.name}: {error}") from None
     shortest = 2 * settings.structure.memory + 2
     if u.size < shortest:

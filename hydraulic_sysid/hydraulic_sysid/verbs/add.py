@@ -6,20 +6,13 @@ Writes add.json, a page (report.html) and the new model (model.yaml), whose hist
 from __future__ import annotations
 
 import argparse
-import sys
+from functools import partial
 
-from rich.console import Console
-
-from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sysid.data import results
-from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.diagnosis.calibrate import Settings
-from hydraulic_sysid.diagnosis.search import DiagnosisError, add
-from hydraulic_sysid.verbs import _cli as cli
-
-from .compare import summary_json
-from .diagnose import LONG, MODEL, add_diagnosis_options, check_target, show
+from hydraulic_sysid.diagnosis.search import add
+from hydraulic_sysid.verbs import _diagnosis_table
+from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
 example:
@@ -31,36 +24,16 @@ exit codes: 0 held-out data bear the effect out; 1 they do not (the model is wri
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("add", __doc__.partition("\n")[0], EPILOG)
+    parser = opt.parser("add", __doc__, EPILOG)
     parser.add_argument("effect", metavar="EFFECT", help="name of an effect (hydraulic_sim effects lists them)")
-    add_diagnosis_options(parser)
-    return cli.run(parser, _add, argv, errors=(ModelError, SimulationError, DiagnosisError, results.ResultError))
+    opt.add_diagnosis_options(parser)
+    return opt.run(parser, _add, _diagnosis_table.show, argv, bulky=("worst_segments",))
 
 
-def _add(options: argparse.Namespace) -> int:
-    from .compare import read_window
-
-    check_target(options, "add", (MODEL,))
+def _add(options: argparse.Namespace, say: opt.Say) -> opt.Done:
+    opt.check_new(options.out, opt.MODEL)
     model = load_model(options.model)
-    records = read_window(options)
-    held_out = read_all(options.holdout, options.columns) if options.holdout else []
-    with Console(stderr=True).status("fitting …") as status:
-        done = add(
-            model, options.effect, records, held_out, Settings(length=options.piece),
-            lambda text: status.update(f"{text} …"),
-        )  # fmt: skip
-    results.write_result(options.out, done.result)
-    save_model(done.model, options.out / MODEL)
-    from hydraulic_sysid.report import write_page
-
-    page = write_page(options.out, results.read_folder(options.out))
-    if options.json:
-        print(summary_json(done.result, LONG))
-    else:
-        show(done.result, Console(file=sys.stdout, highlight=False))
-        print(f"\n{options.out / MODEL}\n{page}")
-    return cli.OK if done.confirmed else cli.NEGATIVE
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    records = opt.read_records(options)
+    held_out = opt.read_held_out(options.holdout, options)
+    done = add(model, options.effect, records, held_out, Settings(length=options.piece), say)
+    return opt.Done(done.result, {opt.MODEL: partial(save_model, done.model)}, done.confirmed)

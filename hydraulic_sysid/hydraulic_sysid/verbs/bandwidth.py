@@ -8,22 +8,16 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from hydraulic_sim.errors import ModelError, SimulationError
+from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.data import results
 from hydraulic_sysid.data.display import number
-from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.excitation import load_plan
 from hydraulic_sysid.linear import bandwidth
-from hydraulic_sysid.verbs import _cli as cli
-
-from .compare import add_folder_options, summary_json
+from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
 examples:
@@ -38,23 +32,20 @@ running bench the excitation node measures it: service ~/measure_bandwidth, resu
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("bandwidth", __doc__.partition("\n")[0], EPILOG)
-    cli.add_record_options(parser, required=False)
+    parser = opt.parser("bandwidth", __doc__, EPILOG)
+    opt.add_record_options(parser, required=False, window=False)
     parser.add_argument("--model", metavar="FILE", help="model file, or the name of a preset")
     parser.add_argument("--probe", metavar="PLAN", help="play this plan on the model instead of linearising it")
     parser.add_argument("--position", metavar="M", type=float, default=0.0, help="of the piston (default: mid stroke)")
-    parser.add_argument("--period", metavar="SECONDS", type=float, help="of the excitation, where no plan tells it")
-    parser.add_argument("--start", metavar="SECONDS", type=float, default=0.0, help="where its periods begin")
-    add_folder_options(parser)
-    return cli.run(parser, _bandwidth, argv, errors=(ModelError, SimulationError, results.ResultError))
+    opt.add_period_options(parser)
+    return opt.run(parser, _bandwidth, _show, argv, bulky=("frequency", "response", "closed_loop", "coherence"))
 
 
-def _bandwidth(options: argparse.Namespace) -> int:
+def _bandwidth(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     if bool(options.record) == bool(options.model):
         raise cli.UsageError("name either a --model or a --record")
     if options.probe and not options.model:
         raise cli.UsageError("--probe is played on a --model")
-    results.check_target(options.out, "bandwidth")
     coherence = None
     if options.model:
         model = load_model(options.model)
@@ -65,40 +56,26 @@ def _bandwidth(options: argparse.Namespace) -> int:
         else:
             found = bandwidth.from_model(model, options.position)
     else:
-        records = read_all(options.record, options.columns)
+        records = opt.read_records(options)
         if len(records) > 1:
             raise cli.UsageError(f"one record is measured at a time; there are {len(records)}")
         found, coherence = bandwidth.from_record(records[0], options.period, options.start)
         source = {"kind": "record", "name": records[0].name, "path": str(records[0].source)}
-    result = bandwidth.document(found, source, coherence)
-    results.write_result(options.out, result)
-    from hydraulic_sysid.report import write_page
-
-    page = write_page(options.out, results.read_folder(options.out))
-    if options.json:
-        print(summary_json(result, ("frequency", "response", "closed_loop", "coherence")))
-    else:
-        _print(result, Console(file=sys.stdout, highlight=False, markup=False))
-        print(f"\n{page}")
-    return cli.OK
+    return opt.Done(bandwidth.document(found, source, coherence))
 
 
-def _print(result: dict[str, Any], console: Console) -> None:
-    table = Table(title=f"bandwidth of {result['source']['name']} ({result['source']['kind']})", title_justify="left")
-    table.add_column("")
-    table.add_column("", justify="right")
-    table.add_row("position, closed loop", f"{number(result['position_bandwidth'])} Hz")
-    table.add_row("velocity, open loop", _velocity(result))
-    table.add_row("velocity gain", f"{number(1e3 * result['velocity_gain'])} mm/(s·V)")
-    table.add_row("critical gain", f"{number(result['critical_gain'])} V/m at {number(result['phase_crossover'])} Hz")
-    console.print(table)
+def _show(result: dict[str, Any], console: Console) -> None:
+    rows = [
+        ("position, closed loop", f"{number(result['position_bandwidth'])} Hz"),
+        ("velocity, open loop", _velocity(result)),
+        ("velocity gain", f"{number(1e3 * result['velocity_gain'])} mm/(s·V)"),
+        ("critical gain", f"{number(result['critical_gain'])} V/m at {number(result['phase_crossover'])} Hz"),
+    ]
+    source = result["source"]
+    console.print(tables.table(f"bandwidth of {source['name']} ({source['kind']})", ("", ">"), rows))
     console.print(result["verdict"]["text"])
 
 
 def _velocity(result: dict[str, Any]) -> str:
     found = result["velocity_bandwidth"]
     return f"{number(found)} Hz" if math.isfinite(found) else f"beyond {number(result['frequency'][-1])} Hz"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -8,22 +8,17 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from hydraulic_sim.errors import ModelError, SimulationError
+from hydraulic_node_utils import tables
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sysid.data import results
-from hydraulic_sysid.data.records import read_all
-from hydraulic_sysid.diagnosis.calibrate import CalibrationError, Settings, calibrate
-from hydraulic_sysid.verbs import _cli as cli
+from hydraulic_sysid.diagnosis.calibrate import Settings, calibrate
+from hydraulic_sysid.verbs import _options as opt
 
-from .compare import add_folder_options, add_window_option, read_window, summary_json
-
-MODEL = "model.yaml"
 EPILOG = """\
 examples:
   python -m hydraulic_sysid calibrate --model sample_bench --record examples/sample_bench --out runs/calibrated
@@ -33,75 +28,44 @@ examples:
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("calibrate", __doc__.partition("\n")[0], EPILOG)
-    parser.add_argument("--model", metavar="FILE", required=True, help="model file, or the name of a preset")
-    cli.add_record_options(parser)
-    add_window_option(parser)
-    parser.add_argument("--holdout-record", metavar="PATH", type=cli.Path, nargs="+", help="records the fit never sees")
+    parser = opt.parser("calibrate", __doc__, EPILOG)
+    opt.add_model_option(parser)
+    opt.add_record_options(parser)
+    parser.add_argument("--holdout-record", metavar="PATH", type=Path, nargs="+", help="records the fit never sees")
     parser.add_argument(
         "--free", metavar="KEY", nargs="+", help="parameters to fit (default: those the model calls free)"
     )
-    parser.add_argument("--piece", metavar="SECONDS", type=float, default=0.5, help="length of a piece (default 0.5)")
+    opt.add_piece_option(parser)
     parser.add_argument("--robust", action="store_true", help="let outliers count less (soft L1)")
-    add_folder_options(parser)
-    return cli.run(
-        parser, _calibrate, argv, errors=(ModelError, SimulationError, CalibrationError, results.ResultError)
-    )
+    return opt.run(parser, _calibrate, _show, argv)
 
 
-def _calibrate(options: argparse.Namespace) -> int:
-    results.check_target(options.out, "calibrate")
-    if (options.out / MODEL).exists():
-        raise CalibrationError(f"{options.out / MODEL} exists; choose another folder (a model is never overwritten)")
+def _calibrate(options: argparse.Namespace, say: opt.Say) -> opt.Done:
+    opt.check_new(options.out, opt.MODEL)
     model = load_model(options.model)
-    records = read_window(options)
-    held_out = read_all(options.holdout_record, options.columns) if options.holdout_record else []
+    records = opt.read_records(options)
+    held_out = opt.read_held_out(options.holdout_record, options)
     settings = Settings(length=options.piece, robust=options.robust)
-    console = Console(stderr=True)
-    with console.status("calibrating …") as status:
-        done = calibrate(
-            model, records, held_out, settings, options.free, lambda text: status.update(f"calibrating: {text} …")
-        )
-    results.write_result(options.out, done.result)
-    save_model(done.model, options.out / MODEL)
-    from hydraulic_sysid.report import write_page
-
-    page = write_page(options.out, results.read_folder(options.out))
-    if options.json:
-        print(summary_json(done.result, ()))
-    else:
-        _print(done.result, Console(file=sys.stdout, highlight=False))
-        print(f"\n{options.out / MODEL}\n{page}")
-    return cli.OK if done.result["converged"] else cli.NEGATIVE
+    done = calibrate(model, records, held_out, settings, options.free, lambda text: say(f"calibrating: {text}"))
+    return opt.Done(done.result, {opt.MODEL: partial(save_model, done.model)}, done.result["converged"])
 
 
-def _print(result: dict[str, Any], console: Console) -> None:
-    table = Table(title=f"{result['model']['name']}: calibrated (± standard error)", title_justify="left")
-    table.add_column("parameter", no_wrap=True)
-    table.add_column("before", justify="right", no_wrap=True)
-    table.add_column("after", justify="left", no_wrap=True)
+def _show(result: dict[str, Any], console: Console) -> None:
+    values = []
     for p in result["parameters"]:
         unit = "" if p["unit"] == "1" else f" {p['unit']}"
         note = ", at bound" if p["at_bound"] else ""
-        after = f"{p['value']:.4g} ± {_error(p['standard_error'])}{unit}{note}"
-        table.add_row(p["key"], f"{p['before']:.4g}", after)
-    console.print(table)
-    table = Table(title="residual over noise", title_justify="left")
-    for title in ("record", "", "channel", "before", "after"):
-        table.add_column(title, justify="right" if title in ("before", "after") else "left")
-    for part, word in (("fit", "fit"), ("test", "test")):
-        for row in (result[part] or {"records": []})["records"]:
-            table.add_row(row["record"], word, row["channel"], f"{row['before']:.3g}", f"{row['after']:.3g}")
-    console.print(table)
+        error = f"{p['standard_error']:.2g}" if math.isfinite(p["standard_error"]) else "not identifiable"
+        values.append((p["key"], f"{p['before']:.4g}", f"{p['value']:.4g} ± {error}{unit}{note}"))
+    title = f"{result['model']['name']}: calibrated (± standard error)"
+    console.print(tables.table(title, ("|parameter", ">|before", "|after"), values))
+    fits = [
+        (row["record"], part, row["channel"], f"{row['before']:.3g}", f"{row['after']:.3g}")
+        for part in ("fit", "test")
+        for row in (result[part] or {"records": []})["records"]
+    ]
+    console.print(tables.table("residual over noise", ("record", "", "channel", ">before", ">after"), fits))
     for direction in result["not_identifiable"]:
         parts = ", ".join(f"{k} {w:+.2f}" for k, w in direction["weights"].items())
         console.print(f"the data cannot identify the combination {parts}")
     console.print(result["verdict"]["text"])
-
-
-def _error(value: float) -> str:
-    return f"{value:.2g}" if math.isfinite(value) else "not identifiable"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

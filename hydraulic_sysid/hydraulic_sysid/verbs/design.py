@@ -7,25 +7,21 @@ the model. Writes the plan, with what the model does under it, for the excitatio
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from hydraulic_sim.errors import ModelError, SimulationError
+from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import Model, load_model
-from hydraulic_sysid.data import results
 from hydraulic_sysid.data.display import quantity, span
-from hydraulic_sysid.excitation import ExcitationError, load_plan, save_plan
+from hydraulic_sysid.excitation import load_plan, save_plan
 from hydraulic_sysid.excitation.amplitude import Limits, Sized, largest
 from hydraulic_sysid.excitation.design import SIGNALS, Wish, propose
 from hydraulic_sysid.excitation.design_document import document
 from hydraulic_sysid.linear.bandwidth import from_model, from_rehearsal
-from hydraulic_sysid.verbs import _cli as cli
-
-from .compare import add_folder_options, summary_json
+from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
 examples:
@@ -35,20 +31,13 @@ examples:
 
 The plan is played by the excitation node: -p plan:=runs/design/chirp.yaml
 """
-_LIMITS = {
-    "drive": ("V", "largest drive"),
-    "travel": ("m", "largest distance from the centre"),
-    "velocity": ("m/s", "largest speed"),
-    "pressure_min": ("Pa", "least pressure of a chamber"),
-    "pressure_max": ("Pa", "largest pressure of a chamber"),
-}
 
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("design", __doc__.partition("\n")[0], EPILOG)
+    parser = opt.parser("design", __doc__, EPILOG)
     parser.add_argument("signal", metavar="SIGNAL", choices=tuple(SIGNALS), help=f"one of {', '.join(SIGNALS)}")
-    parser.add_argument("--model", metavar="FILE", required=True, help="model file, or the name of a preset")
+    opt.add_model_option(parser)
     band = parser.add_mutually_exclusive_group()
     band.add_argument("--bandwidth", metavar="HZ", type=float, help="of the actuator (default: that of the model)")
     band.add_argument("--probe", metavar="PLAN", help="bandwidth of a probe played on the model, with its friction")
@@ -62,17 +51,13 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--realisations", metavar="N", type=int, default=1, help="plans that differ in the seed")
     parser.add_argument("--part", metavar="PART", type=float, default=1.0, help="of the largest amplitude (default 1)")
     parser.add_argument("--centre", metavar="M", type=float, default=0.0, help="around which the piston moves")
-    for name, (unit, what) in _LIMITS.items():
-        option = f"--{name.replace('_', '-')}"
-        parser.add_argument(option, metavar=unit, type=float, help=f"{what} (default: from the model)")
-    add_folder_options(parser)
-    return cli.run(parser, _design, argv, errors=(ModelError, SimulationError, results.ResultError))
+    opt.add_limit_options(parser, "model")
+    return opt.run(parser, _design, _show, argv, bulky=("traces", "spectrum"))
 
 
-def _design(options: argparse.Namespace) -> int:
-    results.check_target(options.out, "design")
+def _design(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     if options.realisations < 1 or not 0.0 < options.part <= 1.0:
-        raise ExcitationError("--realisations is 1 or more, --part above 0 and up to 1")
+        raise cli.UsageError("--realisations is 1 or more, --part above 0 and up to 1")
     model = load_model(options.model)
     bandwidth = options.bandwidth
     if options.probe:
@@ -80,37 +65,22 @@ def _design(options: argparse.Namespace) -> int:
     elif bandwidth is None and options.band is None:
         bandwidth = from_model(model, options.centre).position
     low, high = options.band or (options.share[0] * bandwidth, options.share[1] * bandwidth)
-    limits = Limits.of(model, options.centre)
-    limits = replace(limits, **{k: getattr(options, k) for k in _LIMITS if getattr(options, k) is not None})
+    limits = replace(Limits.of(model, options.centre), **opt.given_limits(options))
     names = [options.signal]
     if options.realisations > 1:
         names = [f"{options.signal}_{number}" for number in range(1, options.realisations + 1)]
-    files = [options.out / f"{name}.yaml" for name in names]
-    there = [str(file) for file in files if file.exists()]
-    if there:
-        raise ExcitationError(f"{', '.join(there)} exists; choose another folder (a plan is never overwritten)")
+    files = [f"{name}.yaml" for name in names]
+    opt.check_new(options.out, *files, what="plan")
+    say("rehearsing on the model")
     sized: list[Sized] = []
-    with Console(stderr=True).status("rehearsing on the model …"):
-        for number, name in enumerate(names):
-            wish = Wish(low, high, options.duration, options.rate, options.seed + number)
-            plan = replace(propose(options.signal, wish), name=name, centre=options.centre)
-            sized.append(largest(plan, model, limits, options.part))
+    for number, name in enumerate(names):
+        wish = Wish(low, high, options.duration, options.rate, options.seed + number)
+        plan = replace(propose(options.signal, wish), name=name, centre=options.centre)
+        sized.append(largest(plan, model, limits, options.part))
     if len(sized) > 1:  # realisations of one distribution have one amplitude: the least that any of them allows
         sized = _alike(sized, model, limits)
-    options.out.mkdir(parents=True, exist_ok=True)
-    for one, file in zip(sized, files, strict=True):
-        save_plan(one.plan, file)
-    result = document(sized, [str(file) for file in files], bandwidth, (low, high), limits)
-    results.write_result(options.out, result)
-    from hydraulic_sysid.report import write_page
-
-    page = write_page(options.out, results.read_folder(options.out))
-    if options.json:
-        print(summary_json(result, ("traces", "spectrum")))
-    else:
-        _print(result, Console(file=sys.stdout, highlight=False, markup=False))
-        print("\n" + "\n".join([*map(str, files), str(page)]))
-    return cli.OK
+    result = document(sized, [str(options.out / file) for file in files], bandwidth, (low, high), limits)
+    return opt.Done(result, {file: partial(save_plan, one.plan) for file, one in zip(files, sized, strict=True)})
 
 
 def _alike(sized: list[Sized], model: Model, limits: Limits) -> list[Sized]:
@@ -125,23 +95,15 @@ def _alike(sized: list[Sized], model: Model, limits: Limits) -> list[Sized]:
     return found
 
 
-def _print(result: dict[str, Any], console: Console) -> None:
-    table = Table(title=f"{result['signal']} on {result['model']['name']}, predicted", title_justify="left")
-    table.add_column("plan", no_wrap=True)
-    for title in ("drive", "position", "speed", "pressures"):
-        table.add_column(title, justify="right", no_wrap=True)
+def _show(result: dict[str, Any], console: Console) -> None:
+    rows = []
     for plan in result["plans"]:
         p = plan["prediction"]
-        table.add_row(
-            plan["name"].rpartition("_")[2] if len(result["plans"]) > 1 else plan["name"],
-            f"±{quantity(p['drive_peak'], 'V')}",
-            span(p["position_min"], p["position_max"], "m"),
-            quantity(p["velocity_peak"], "m/s"),
-            span(p["pressure_min"], p["pressure_max"], "Pa"),
-        )
-    console.print(table)
+        name = plan["name"].rpartition("_")[2] if len(result["plans"]) > 1 else plan["name"]
+        position = span(p["position_min"], p["position_max"], "m")
+        pressures = span(p["pressure_min"], p["pressure_max"], "Pa")
+        drive, speed = quantity(p["drive_peak"], "V"), quantity(p["velocity_peak"], "m/s")
+        rows.append((name, f"±{drive}", position, speed, pressures))
+    columns = ("|plan", ">|drive", ">|position", ">|speed", ">|pressures")
+    console.print(tables.table(f"{result['signal']} on {result['model']['name']}, predicted", columns, rows))
     console.print(result["verdict"]["text"])
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -10,22 +10,19 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
+from functools import partial
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from hydraulic_sysid.data import results
+from hydraulic_node_utils import tables
 from hydraulic_sysid.data.display import number, shown
-from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.linear import identification
 from hydraulic_sysid.linear.models import (
     CRITERIA,
     OFFSETS,
     Arx,
     ArxOrder,
-    IdentificationError,
     StateSpace,
     Structure,
     TransferFunction,
@@ -33,9 +30,7 @@ from hydraulic_sysid.linear.models import (
     write_linear_model,
 )
 from hydraulic_sysid.linear.models.model_file import check_place
-from hydraulic_sysid.verbs import _cli as cli
-
-from .compare import add_folder_options, add_window_option, read_window, summary_json
+from hydraulic_sysid.verbs import _options as opt
 
 MODEL_FILE = "linear_model.json"
 EPILOG = """\
@@ -50,9 +45,8 @@ MODELS = ("arx", "iv", "tf", "ss")
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("identify", __doc__.partition("\n")[0], EPILOG)
-    cli.add_record_options(parser)
-    add_window_option(parser)
+    parser = opt.parser("identify", __doc__, EPILOG)
+    opt.add_record_options(parser)
     parser.add_argument(
         "--model",
         choices=MODELS,
@@ -76,26 +70,19 @@ def main(argv: list[str] | None = None) -> int:
         type=float,
         help="of the model (default 0.05 or the records' own where that is longer; tf: the records' own)",
     )
-    held = parser.add_mutually_exclusive_group()
-    held.add_argument(
-        "--holdout", metavar="PART", type=float, default=0.2, help="last part of every record to hold out (default 0.2)"
-    )
-    held.add_argument("--holdout-record", metavar="PATH", type=cli.Path, nargs="+", help="records to hold out instead")
+    opt.add_part_options(parser, 0.2)
     parser.add_argument(
         "--offsets", choices=OFFSETS, default="estimate", help="constant offsets (default: estimate them)"
     )
-    parser.add_argument("--input", metavar="CHANNEL", default="drive", help="input channel (default drive)")
-    parser.add_argument("--output", metavar="CHANNEL", default="position", help="output channel (default position)")
-    add_folder_options(parser)
-    return cli.run(parser, _identify, argv, errors=(IdentificationError, results.ResultError))
+    opt.add_channel_options(parser)
+    return opt.run(parser, _identify, _show, argv, bulky=("traces",))
 
 
-def _identify(options: argparse.Namespace) -> int:
-    results.check_target(options.out, "identify")
+def _identify(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     check_place(options.out / MODEL_FILE)
     structure = _structure(options)
-    records = read_window(options)
-    held_out = read_all(options.holdout_record, options.columns) if options.holdout_record else None
+    records = opt.read_records(options)
+    held_out = opt.read_held_out(options.holdout_record, options) or None
     own = max(r.dt for r in [*records, *(held_out or [])])
     settings = identification.Settings(
         structure=structure,
@@ -107,17 +94,8 @@ def _identify(options: argparse.Namespace) -> int:
         output=options.output,
     )
     result, model = identification.identify_model(records, held_out, settings)
-    results.write_result(options.out, result)
-    path = write_linear_model(options.out / MODEL_FILE, model, **identification.about(result))
-    from hydraulic_sysid.report import write_page
-
-    page = write_page(options.out, results.read_folder(options.out))
-    if options.json:
-        print(summary_json(result, ("traces",)))
-    else:
-        _print(result, Console(file=sys.stdout, highlight=False, markup=False))
-        print(f"\n{path}\n{page}")
-    return cli.OK
+    write = partial(write_linear_model, model=model, **identification.about(result))
+    return opt.Done(result, {MODEL_FILE: write})
 
 
 def _structure(options: argparse.Namespace) -> Structure:
@@ -128,13 +106,11 @@ def _structure(options: argparse.Namespace) -> Structure:
     return StateSpace(options.states)
 
 
-def _print(result: dict[str, Any], console: Console) -> None:
+def _show(result: dict[str, Any], console: Console) -> None:
     own = result["settings"]["output"]["unit"]
     factor, unit = shown(own)
-    table = Table(title="Best fit in free run and one step ahead", title_justify="left")
-    for title in ("record", "data", "samples", "free run", "one step", f"MSE, one step, {unit}²"):
-        left = title in ("record", "data")
-        table.add_column(title, justify="left" if left else "right", no_wrap=left)
+    columns = ("|record", "|data", ">samples", ">free run", ">one step", f">MSE, one step, {unit}²")
+    table = tables.table("Best fit in free run and one step ahead", columns)
     for part, word in (("test", "held out"), ("fit", "fitted")):
         for r in result[part]["records"]:
             table.add_row(
@@ -160,7 +136,3 @@ def _fit(value: float) -> str:
 
 def _pole(pole: dict[str, Any]) -> str:
     return f"{pole['real']:.4f}" + (f"{pole['imaginary']:+.4f}i" if pole["imaginary"] else "")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

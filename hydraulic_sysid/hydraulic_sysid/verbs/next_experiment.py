@@ -8,28 +8,22 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from hydraulic_sim.errors import ModelError, SimulationError
+from hydraulic_node_utils import tables
 from hydraulic_sim.model_file import Model, load_model
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.display import number, span
-from hydraulic_sysid.data.records import read_all
-from hydraulic_sysid.diagnosis.calibrate import CalibrationError
 from hydraulic_sysid.diagnosis.next_experiment import NextExperimentError, limits_of, next_experiment
 from hydraulic_sysid.estimation.noise import noise_floor
 from hydraulic_sysid.estimation.segments import MEASURED
-from hydraulic_sysid.verbs import _cli as cli
+from hydraulic_sysid.verbs import _options as opt
 
-from .compare import add_folder_options, summary_json
-from .design import _LIMITS
-
+PLAN = "next_experiment.yaml"
 EPILOG = """\
 examples:
   python -m hydraulic_sysid next_experiment --diagnosis runs/diagnosed --out runs/next
@@ -42,13 +36,13 @@ The plan is played by the excitation node: -p plan:=runs/next/next_experiment.ya
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("next_experiment", __doc__.partition("\n")[0], EPILOG)
+    parser = opt.parser("next_experiment", __doc__, EPILOG)
     rivals = parser.add_mutually_exclusive_group(required=True)
     rivals.add_argument(
         "--diagnosis", metavar="DIR", type=Path, help="folder of a diagnosis that names several effects"
     )
     rivals.add_argument("--model", metavar="FILE", nargs="+", help="the rivals' model files, fitted, two or more")
-    cli.add_record_options(parser, required=False)
+    opt.add_record_options(parser, required=False, window=False)
     parser.add_argument(
         "--noise", metavar="CHANNEL=SIGMA", nargs="+", default=[],
         help="measured channels and their noise [m, Pa] (default: from the diagnosis, or from --record)",
@@ -57,42 +51,23 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--rate", metavar="HZ", type=float, default=1000.0, help="samples per second (default 1000)")
     parser.add_argument("--centre", metavar="M", type=float, default=0.0, help="around which the piston moves")
     parser.add_argument("--piece", metavar="SECONDS", type=float, help="length of a piece (default: the diagnosis's)")
-    for name, (unit, what) in _LIMITS.items():
-        option = f"--{name.replace('_', '-')}"
-        parser.add_argument(option, metavar=unit, type=float, help=f"{what} (default: from the models)")
-    add_folder_options(parser)
-    errors = (ModelError, SimulationError, CalibrationError, results.ResultError)
-    return cli.run(parser, _design, argv, errors=errors)
+    opt.add_limit_options(parser, "models")
+    return opt.run(parser, _design, _show, argv, bulky=("traces", "differences"))
 
 
-def _design(options: argparse.Namespace) -> int:
-    results.check_target(options.out, "next_experiment")
-    for file in (options.out / "next_experiment.yaml", options.out / "next_experiment.csv"):
-        if file.exists():
-            raise NextExperimentError(f"{file} exists; choose another folder (a plan is never overwritten)")
+def _design(options: argparse.Namespace, say: opt.Say) -> opt.Done:
+    opt.check_new(options.out, PLAN, "next_experiment.csv", what="plan")
     diagnosis = _diagnosis(options.diagnosis) if options.diagnosis else None
     rivals = _tied(options.diagnosis, diagnosis) if diagnosis else _named(options.model)
     noise = _noise(options, diagnosis)
-    given = {k: getattr(options, k) for k in _LIMITS if getattr(options, k) is not None}
-    limits = replace(limits_of(rivals, options.centre), **given)
+    limits = replace(limits_of(rivals, options.centre), **opt.given_limits(options))
     piece = options.piece or float((diagnosis or {}).get("settings", {}).get("segment_length", 0.5))
-    with Console(stderr=True).status("designing …") as status:
-        proposal = next_experiment(
-            rivals, limits, noise, options.seconds, lambda text: status.update(f"designing: {text} …"),
-            centre=options.centre, rate=options.rate, piece=piece,
-        )  # fmt: skip
-    file = proposal.save(options.out)
-    result = {**proposal.document, "file": str(file)}
-    results.write_result(options.out, result)
-    from hydraulic_sysid.report import write_page
-
-    page = write_page(options.out, results.read_folder(options.out))
-    if options.json:
-        print(summary_json(result, ("traces", "differences")))
-    else:
-        _print(result, Console(file=sys.stdout, highlight=False, markup=False))
-        print(f"\n{file}\n{page}")
-    return cli.OK if result["verdict"]["level"] != "off" else cli.NEGATIVE
+    proposal = next_experiment(
+        rivals, limits, noise, options.seconds, lambda text: say(f"designing: {text}"),
+        centre=options.centre, rate=options.rate, piece=piece,
+    )  # fmt: skip
+    result = {**proposal.document, "file": str(options.out / PLAN)}
+    return opt.Done(result, {PLAN: lambda file: proposal.save(file.parent)}, result["verdict"]["level"] != "off")
 
 
 def _diagnosis(folder: Path) -> dict[str, Any]:
@@ -143,7 +118,7 @@ def _noise(options: argparse.Namespace, diagnosis: dict[str, Any] | None) -> dic
                 raise NextExperimentError(f"--noise {item}: allowed is CHANNEL=NUMBER, as position=2e-5") from None
         return found
     if options.record:
-        records = read_all(options.record, options.columns)
+        records = opt.read_records(options)
         channels = [c for c in MEASURED if all(c in r for r in records)]
         return {c: statistics.median(noise_floor(r[c]) for r in records) for c in channels}
     if diagnosis is not None:
@@ -151,23 +126,20 @@ def _noise(options: argparse.Namespace, diagnosis: dict[str, Any] | None) -> dic
     raise NextExperimentError("which channels are measured, and how noisy? Name a --record, or --noise CHANNEL=SIGMA …")
 
 
-def _print(result: dict[str, Any], console: Console) -> None:
-    table = Table(title="what the experiment decides, predicted", title_justify="left")
-    for title in ("true", "refitted to it", "apart [σ]", "mistaken", "needs [s]"):
-        table.add_column(title, justify="left" if title in ("true", "refitted to it") else "right", no_wrap=True)
-    for p in result["pairs"]:
-        mistaken = (
-            "< 1e-9" if p["misclassification_probability"] < 1e-9 else f"{p['misclassification_probability']:.1g}"
+def _show(result: dict[str, Any], console: Console) -> None:
+    rows = [
+        (
+            p["true"], p["refitted"], number(p["separation"]),
+            "< 1e-9" if p["misclassification_probability"] < 1e-9 else f"{p['misclassification_probability']:.1g}",
+            number(p["seconds_needed"]),
         )
-        table.add_row(p["true"], p["refitted"], number(p["separation"]), mistaken, number(p["seconds_needed"]))
-    console.print(table)
+        for p in result["pairs"]
+    ]  # fmt: skip
+    columns = ("|true", "|refitted to it", ">|apart [σ]", ">|mistaken", ">|needs [s]")
+    console.print(tables.table("what the experiment decides, predicted", columns, rows))
     p = result["prediction"]
     console.print(
         f"position {span(p['position_min'], p['position_max'], 'm')}, "
         f"pressures {span(p['pressure_min'], p['pressure_max'], 'Pa')}, on every rival"
     )
     console.print(result["verdict"]["text"])
-
-
-if __name__ == "__main__":
-    sys.exit(main())

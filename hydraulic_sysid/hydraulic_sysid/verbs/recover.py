@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
+from hydraulic_node_utils import cli
 from hydraulic_sysid.data.bag import Recovery, recover
-from hydraulic_sysid.verbs import _cli as cli
+from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
 examples:
@@ -23,19 +23,18 @@ examples:
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("recover", __doc__.partition("\n")[0], EPILOG)
+    parser = opt.parser("recover", __doc__, EPILOG)
     parser.add_argument("bag", metavar="BAG", type=Path, help="folder of the bag")
     parser.add_argument("--out", metavar="DIR", type=Path, help="write here, a new folder, and leave BAG as it is")
     parser.add_argument("--json", action="store_true", help="print the result as JSON instead of a table")
     return cli.run(parser, _recover, argv)
 
 
-def _recover(options: argparse.Namespace) -> int:
+def _recover(options: argparse.Namespace) -> None:
     if options.out is not None:
         cli.new_path(options.out)
     result = recover(options.bag, options.out)
     print(_as_json(result) if options.json else _as_text(result))
-    return cli.OK
 
 
 def _as_json(result: Recovery) -> str:
@@ -77,7 +76,3 @@ def _lost(result: Recovery, name: str) -> str:
     """How many are missing between the first and the last message; blank where nothing tells."""
     lost = result.missing.get(name)
     return f"{lost:>7} lost" if lost is not None else " " * 12
-
-
-if __name__ == "__main__":
-    sys.exit(main())

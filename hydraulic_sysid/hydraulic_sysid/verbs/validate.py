@@ -8,24 +8,19 @@ beside it. Records are tried alike, one step ahead too. Writes the errors (valid
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
+from hydraulic_node_utils import tables
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.data import results
 from hydraulic_sysid.data.display import number, shown
-from hydraulic_sysid.data.records import read_all
-from hydraulic_sysid.linear.models import IdentificationError, read_linear_model
+from hydraulic_sysid.linear.models import read_linear_model
 from hydraulic_sysid.linear.validation import SHAPES, Grid
 from hydraulic_sysid.linear.validation.validate import Subject, validate
-from hydraulic_sysid.verbs import _cli as cli
-
-from .compare import add_folder_options, summary_json
+from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
 examples:
@@ -37,7 +32,7 @@ examples:
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
-    parser = cli.parser("validate", __doc__.partition("\n")[0], EPILOG)
+    parser = opt.parser("validate", __doc__, EPILOG)
     parser.add_argument(
         "--linear-model", metavar="FILE", type=Path, nargs="+", required=True, help="models that identify has written"
     )
@@ -51,31 +46,15 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--frequencies", metavar="HZ", type=float, nargs="+", default=[0.2, 0.5, 1.0], help="default 0.2 0.5 1"
     )
-    cli.add_record_options(parser, required=False)
-    add_folder_options(parser)
-    return cli.run(parser, _validate, argv, errors=(IdentificationError, results.ResultError))
+    opt.add_record_options(parser, required=False, window=False)
+    return opt.run(parser, _validate, _show, argv)
 
 
-def _validate(options: argparse.Namespace) -> int:
-    results.check_target(options.out, "validate")
+def _validate(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     subjects = _subjects(options.linear_model)
-    try:
-        grid = Grid(tuple(options.amplitudes), tuple(options.frequencies), tuple(options.shapes))
-    except ValueError as error:
-        raise cli.UsageError(str(error)) from None
+    grid = Grid(tuple(options.amplitudes), tuple(options.frequencies), tuple(options.shapes))
     plant = Plant(load_model(options.model)) if options.model else None
-    records = read_all(options.record, options.columns) if options.record else []
-    result = validate(subjects, plant, grid, records)
-    results.write_result(options.out, result)
-    from hydraulic_sysid.report import write_page
-
-    page = write_page(options.out, results.read_folder(options.out))
-    if options.json:
-        print(summary_json(result, ()))
-    else:
-        _print(result, Console(file=sys.stdout, highlight=False, markup=False))
-        print(f"\n{page}")
-    return cli.OK
+    return opt.Done(validate(subjects, plant, grid, opt.read_records(options)))
 
 
 def _subjects(paths: list[Path]) -> dict[str, Subject]:
@@ -91,14 +70,11 @@ def _subjects(paths: list[Path]) -> dict[str, Subject]:
     return found
 
 
-def _print(result: dict[str, Any], console: Console) -> None:
+def _show(result: dict[str, Any], console: Console) -> None:
     own = result["settings"]["output"]["unit"]
     factor, unit = shown(own)
     names = [m["name"] for m in result["models"]]
-    table = Table(title=f"RMSE [{unit}] and best fit of the free run", title_justify="left")
-    table.add_column("drive", no_wrap=True)
-    for name in names:
-        table.add_column(name, justify="right")
+    table = tables.table(f"RMSE [{unit}] and best fit of the free run", ("|drive", *(f">{name}" for name in names)))
     for cell in result["grid"]:
         mark = "" if cell["within_travel"] else ", meets the stops"
         title = f"{cell['shape']} {cell['amplitude']:g} V {cell['frequency']:g} Hz{mark}"
@@ -114,7 +90,3 @@ def _error(figures: dict[str, Any], factor: float) -> str:
     if figures["rmse"] != figures["rmse"]:
         return "–"
     return f"{number(figures['rmse'] * factor)} ({figures['best_fit']:.1f} %)".replace("-", "−")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hydraulic_interfaces.errors import HydraulicError
+
 Array = NDArray[np.float64]
 
 MAX_DEVIATION = 0.5
@@ -16,7 +18,7 @@ P99_DEVIATION = 0.25
 _SAME = 1e-6
 
 
-class IrregularTimeError(Exception):
+class IrregularTimeError(HydraulicError):
     """Stamps that are not evenly spaced: ``index`` of the first bad one, the problem, what was expected."""
 
     def __init__(self, index: int, problem: str, expected: str) -> None:

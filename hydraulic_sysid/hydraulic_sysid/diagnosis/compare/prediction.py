@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant, PlantState
 from hydraulic_sysid.data.records import Record
@@ -34,7 +35,7 @@ _SMOOTHING = 7  # samples; a quadratic over them keeps motion to a quarter of th
 _SENSED = ("position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool")
 
 
-class ComparisonError(ValueError):
+class ComparisonError(HydraulicError, ValueError):
     """A record or a setting does not allow the comparison (channel missing, record too short)."""
 
 

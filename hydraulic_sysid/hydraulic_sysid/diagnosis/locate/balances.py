@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.slots import SLOTS
@@ -41,7 +42,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
 """Channels that a balance of a hydraulic plant needs beside drive and position."""
 
 
-class LocateError(ValueError):
+class LocateError(HydraulicError, ValueError):
     """A record does not allow any balance (channel missing, too short); the message says what is needed."""
 
 

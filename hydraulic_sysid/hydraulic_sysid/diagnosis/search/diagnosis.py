@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
@@ -27,7 +28,7 @@ from .shape import Shape, shapes
 from .uncertainty import Known, parameter_errors
 
 
-class DiagnosisError(ValueError):
+class DiagnosisError(HydraulicError, ValueError):
     """Records or model do not allow a diagnosis; the message says what is needed."""
 
 

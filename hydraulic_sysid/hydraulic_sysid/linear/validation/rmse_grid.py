@@ -20,6 +20,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.resampling import held_average, sampled
 from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.linear.models.errors import IdentificationError
 from hydraulic_sysid.linear.models.model import LinearModel
 
 Array = NDArray[np.float64]
@@ -47,11 +48,11 @@ class Grid:
     def __post_init__(self) -> None:
         unknown = [s for s in self.shapes if s not in SHAPES]
         if unknown:
-            raise ValueError(f"shape {unknown[0]!r} is none of {', '.join(SHAPES)}")
+            raise IdentificationError(f"shape {unknown[0]!r} is none of {', '.join(SHAPES)}")
         for name, values in (("amplitude", self.amplitudes), ("frequency", self.frequencies)):
             for value in values:
                 if not (np.isfinite(value) and value > 0.0):
-                    raise ValueError(f"{name} {value:g} must be positive")
+                    raise IdentificationError(f"{name} {value:g} must be positive")
 
 
 def periodic(shape: str, amplitude: float, frequency: float, duration: float, dt: float) -> Array:

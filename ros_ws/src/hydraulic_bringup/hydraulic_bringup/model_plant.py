@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hydraulic_can_driver.virtual import Reading
+from hydraulic_sim.errors import ModelError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.trial_drive import trial_drive
@@ -19,8 +20,8 @@ class ModelPlant:
     ``rate`` [Hz] of the steps to come; ``position`` [m] to start from, 0 is mid-stroke; standard deviations of the
     noise of position [m] and pressures [Pa]; ``seed`` of the noise. Compiles at once.
 
-    :raises HydraulicSimError: the model is not acceptable, or no integration step follows its physics.
-    :raises ValueError: the start lies outside the stroke.
+    :raises ModelError: the model is not acceptable, or the start lies outside the stroke.
+    :raises SimulationError: no integration step follows its physics.
     """
 
     def __init__(
@@ -34,7 +35,7 @@ class ModelPlant:
     ) -> None:
         half = 0.5 * model.value("stroke")
         if abs(position) > half:
-            raise ValueError(f"initial position is {position:g} m; {model.name} allows {-half:g} … {half:g} m")
+            raise ModelError(f"initial position is {position:g} m; {model.name} allows {-half:g} … {half:g} m")
         plant = Plant(model).following(trial_drive(model, rate), 1.0 / rate)
         plant.live().step(0.0, 1.0 / rate)  # loads the compiled code, which must not happen on the bench
         self._live = plant.live(plant.initial_state(position=position))

@@ -20,13 +20,14 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Header
 
 from hydraulic_interfaces.contract import PISTON, PLANT_FRAME, SERVOVALVE
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_interfaces.samples import NAN, Command, PlantSample, Reference
 
 _SECOND = 1_000_000_000
 _ENCAPSULATION = 4
 
 
-class MessageError(ValueError):
+class MessageError(HydraulicError, ValueError):
     """A message that does not carry what the contract says: the text names the field and what it holds."""
 
 

@@ -5,3 +5,6 @@ from __future__ import annotations
 
 class HydraulicError(Exception):
     """Its text says what is wrong, where, with which value, and what is allowed; a command line prints it and ends."""
+
+    exit_code = 2
+    """Of the command line that it ends: 2 where the input is at fault, 1 where that was fine but the work failed."""

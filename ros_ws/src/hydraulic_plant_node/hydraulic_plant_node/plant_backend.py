@@ -6,11 +6,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 
-class BackendError(RuntimeError):
+class BackendError(HydraulicError, RuntimeError):
     """The plant cannot do what was asked of it; the text tells the user what is wrong and what to do."""
 
 
@@ -18,7 +19,7 @@ class PlantBackend(ABC):
     """A plant behind the contract. Lifecycle calls come from one thread, `step` from the plant loop's own.
 
     `configure` → `activate` → `step` … `step` → `deactivate` → `cleanup`; any of the first three may raise,
-    preferably `BackendError`, `ValueError` or `OSError` with a text for the user.
+    preferably a `HydraulicError` with a text for the user.
     """
 
     hardware_id: str = "plant"

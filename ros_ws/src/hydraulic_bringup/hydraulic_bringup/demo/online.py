@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import random
+import signal
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -32,6 +34,7 @@ BUS = "bench"
 WATCHDOG_S = 0.2
 # A simulated actuator may be excited again after an abort, also behind virtual CAN devices.
 ATTEMPTS = 2
+_CLIENT = "hydraulic_bringup.nodes._graph_client"
 _START_S = 90.0  # the first start on a machine compiles the physics
 _STEP_S = 20.0
 _LAST_WORDS_S = 3.0
@@ -65,7 +68,7 @@ def run(plant: str, model: Path, experiments: Sequence[Experiment], out: Path, s
     if find_spec(package) is None or find_spec(f"{package}.nodes") is None or find_spec(module) is None:
         raise DemoError("plant", f"plant {plant!r} is not there: no module {module}", "use --plant sim")
     with private_domain() as env, Crew(out / "logs", env) as crew:
-        client_class = import_module("hydraulic_bringup.nodes._graph_client").GraphClient
+        client_class = import_module(_CLIENT).GraphClient
         with client_class() as client:
             simulator = _start_plant(crew, client, plant, module, model, steps)
             bags = [_experiment(crew, client, experiment, out, steps, ATTEMPTS) for experiment in experiments]
@@ -219,6 +222,21 @@ def _aborts(client, since_ns: int) -> list[dict]:
         if ends or time.monotonic() > deadline:
             return ends
         time.sleep(0.05)
+
+
+def take_down_left(code: int) -> None:
+    """The last thing of a program that may have run a graph and ends with ``code``: leave the graph."""
+    if client := sys.modules.get(_CLIENT):
+        client.take_down_left(code)
+
+
+def interrupt_on_sigterm() -> None:
+    """SIGTERM ends this program as Ctrl-C does: by `KeyboardInterrupt`, which stops every process it started."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
 
 
 def timestamped_folder(root: Path, name: str) -> Path:

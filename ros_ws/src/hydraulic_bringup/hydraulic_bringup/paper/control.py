@@ -36,7 +36,7 @@ def save_models(found: Sequence[study.Identified], out: Path) -> dict[str, Path]
 def evaluate(model: Model, files: dict[str, Path]) -> dict[str, Any]:
     """Steps, staircases and sines with the shipped NPID gains: rows of figures, the paper's beside the steps.
 
-    :raises HydraulicControlError: a model that no loop can be closed around.
+    :raises ControlError: a model that no loop can be closed around.
     """
     models = [replace(load_identified(path), name=kind) for kind, path in files.items()]
     result = evaluation.evaluate(gains_file.load(GAINS), model, models, [], STEP_M, SensorNoise())

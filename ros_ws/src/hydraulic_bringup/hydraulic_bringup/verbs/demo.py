@@ -8,7 +8,6 @@ a page says where it fails. With ``--record`` and ``--model`` the same from ther
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import time
 from importlib import resources
@@ -20,9 +19,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 from hydraulic_bringup.demo import offline, online
-from hydraulic_bringup.demo.errors import DemoError
-from hydraulic_interfaces.errors import HydraulicError
-from hydraulic_sim.errors import HydraulicSimError
+from hydraulic_node_utils import cli
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.display import number, quantity
 from hydraulic_sysid.data.records import read_all
@@ -73,52 +70,23 @@ class ProgressSteps:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the demo; 0 done, 1 a step failed, 2 bad options or input, 130 interrupted."""
-    options = _options(argv)
-    signal.signal(signal.SIGTERM, _interrupt)
-    code = _guarded(options, Console(highlight=False))
-    if not options.record:
-        from hydraulic_bringup.nodes._graph_client import take_down_left
-
-        take_down_left(code)
+    code = cli.run(_parser(), _demo, argv, stopped="every process of the demo has been stopped")
+    online.take_down_left(code)
     return code
 
 
-def _guarded(options: argparse.Namespace, console: Console) -> int:
-    try:
-        return _run(options, console)
-    except DemoError as error:
-        print(f"\ndemo failed at step {error.step!r}: {error.why}", file=sys.stderr)
-        if error.remedy:
-            print(error.remedy, file=sys.stderr)
-        return 1
-    except (HydraulicSimError, HydraulicError, OSError) as error:
-        print(f"demo: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("\ninterrupted; every process of the demo has been stopped", file=sys.stderr)
-        return 130
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
-
-
-def _options(argv: list[str] | None) -> argparse.Namespace:
-    """The command line; ends the program with exit code 2 where options contradict each other."""
-    parser = _parser()
-    options = parser.parse_args(argv)
+def _demo(options: argparse.Namespace) -> None:
     if options.columns and not options.record:
-        parser.error("--columns: goes with --record only")
+        raise cli.UsageError("--columns: goes with --record only")
     if options.record and (options.quick or options.plant):
-        parser.error("--record: nothing is excited then, so --plant and --quick do not go with it")
+        raise cli.UsageError("--record: nothing is excited then, so --plant and --quick do not go with it")
     options.plant = options.plant or "sim"
-    return options
+    online.interrupt_on_sigterm()
+    _run(options, Console(highlight=False))
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="demo", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = cli.parser("demo", __doc__)
     parser.add_argument(
         "--record", nargs="+", metavar="PATH", help="records that exist: bag, CSV, MAT, or a folder of such"
     )
@@ -132,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _run(options: argparse.Namespace, console: Console) -> int:
+def _run(options: argparse.Namespace, console: Console) -> None:
     model = load_model(options.model)
     if options.record:
         records = read_all([Path(p) for p in options.record], options.columns)
@@ -159,7 +127,6 @@ def _run(options: argparse.Namespace, console: Console) -> int:
             analysis = offline.analyse(records, held_out, model, out, steps)
     _print(analysis, console)
     console.print(f"\n{time.monotonic() - begun:.0f} s. Open the report: [bold]{analysis.page}[/bold]", soft_wrap=True)
-    return 0
 
 
 def new_folder(wanted: Path | None, name: str) -> Path:

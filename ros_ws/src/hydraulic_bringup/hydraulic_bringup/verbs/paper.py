@@ -9,7 +9,6 @@ and rehearses the rest on the model; --rehearse needs no graph at all.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import time
 from dataclasses import replace
@@ -24,9 +23,7 @@ from hydraulic_bringup.paper import control, playing, study
 from hydraulic_bringup.paper.document import document
 from hydraulic_bringup.paper.printing import show
 from hydraulic_bringup.verbs.demo import ProgressSteps, new_folder
-from hydraulic_control.errors import HydraulicControlError
-from hydraulic_interfaces.errors import HydraulicError
-from hydraulic_sim.errors import HydraulicSimError
+from hydraulic_node_utils import cli
 from hydraulic_sim.model_file import load_model, presets
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data import results
@@ -43,43 +40,13 @@ _START_S = 6.0  # of recorder and excitation, per experiment
 
 def main(argv: list[str] | None = None) -> int:
     """Run the study; 0 done, 1 a step failed, 2 bad options or input, 130 interrupted."""
-    options = _parser().parse_args(argv)
-    signal.signal(signal.SIGTERM, _interrupt)
-    code = _guarded(options, Console(highlight=False))
-    if not options.rehearse:
-        from hydraulic_bringup.nodes._graph_client import take_down_left
-
-        take_down_left(code)
+    code = cli.run(_parser(), _run, argv, stopped="every process of the study has been stopped")
+    online.take_down_left(code)
     return code
 
 
-def _guarded(options: argparse.Namespace, console: Console) -> int:
-    try:
-        return _run(options, console)
-    except DemoError as error:
-        print(f"\npaper failed at step {error.step!r}: {error.why}", file=sys.stderr)
-        if error.remedy:
-            print(error.remedy, file=sys.stderr)
-        return 1
-    except IdentificationError as error:
-        print(f"\npaper failed at step 'identify': {error}", file=sys.stderr)
-        return 1
-    except (HydraulicSimError, HydraulicError, HydraulicControlError, OSError) as error:
-        print(f"paper: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("\ninterrupted; every process of the study has been stopped", file=sys.stderr)
-        return 130
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="paper", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = cli.parser("paper", __doc__)
     parser.add_argument("--model", metavar="FILE", default=DEFAULT, help=f"model file or preset (default {DEFAULT})")
     parser.add_argument("--plant", choices=tuple(online.PLANTS), default="sim", help="what is excited (default sim)")
     how = parser.add_mutually_exclusive_group()
@@ -89,7 +56,9 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _run(options: argparse.Namespace, console: Console) -> int:
+def _run(options: argparse.Namespace) -> None:
+    online.interrupt_on_sigterm()
+    console = Console(highlight=False)
     model = load_model(options.model)
     out = new_folder(options.out, "paper")
     begun = time.monotonic()
@@ -124,7 +93,6 @@ def _run(options: argparse.Namespace, console: Console) -> int:
         page = write_page(out, results.read_folder(out))
     show(result, console)
     console.print(f"\n{time.monotonic() - begun:.0f} s. Open the report: [bold]{page}[/bold]", soft_wrap=True)
-    return 0
 
 
 def _play(options: argparse.Namespace, model: Any, plans: list[Plan], out: Path, steps: Any) -> dict[str, Record]:
@@ -151,7 +119,7 @@ def _analyse(
             found.append(study.identified(one, records[one.name]))
         except IdentificationError as error:
             if one.band == "in":
-                raise
+                raise DemoError("identify", str(error)) from None
             not_fitted[one.name] = str(error)
         steps.tick()
     steps.done()

@@ -18,12 +18,11 @@ from dataclasses import replace
 from hydraulic_bringup.model_plant import ModelPlant
 from hydraulic_can_driver.bus import Bus
 from hydraulic_can_driver.bus_file import load_bus
-from hydraulic_can_driver.errors import CanDriverError
 from hydraulic_can_driver.virtual import VirtualBench
 from hydraulic_can_driver.virtual.faults import FAULTS, Fault
 from hydraulic_can_driver.virtual.wiring import Event
+from hydraulic_node_utils import cli
 from hydraulic_plant_node.pacing import request_realtime
-from hydraulic_sim.errors import HydraulicSimError
 from hydraulic_sim.model_file import load_model
 
 READY = "ready:"
@@ -36,33 +35,32 @@ _FAULT = re.compile(r"(?P<name>\w+):(?P<node>\w+)@(?P<begin>[\d.]+)(?:-(?P<end>[
 
 def main(argv: list[str] | None = None) -> int:
     """Run the devices until Ctrl-C or SIGTERM; 0 then, 1 if the plant fails, 2 for bad options or input."""
-    options = _parser().parse_args(argv)
+    return cli.run(_parser(), _serve, argv)
+
+
+def _serve(options: argparse.Namespace) -> int:
     leave = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: leave.set())
-    try:
-        bus = load_bus(options.bus)
-        bus = replace(
-            bus,
-            interface=options.interface or bus.interface,
-            channel=options.channel or bus.channel,
-            rate=options.rate or bus.rate,
-        )
-        faults = [_fault(text, bus) for text in options.fault]
-        plant = ModelPlant(
-            load_model(options.model),
-            bus.rate,
-            options.initial_position,
-            options.position_noise,
-            options.pressure_noise,
-            options.noise_seed,
-        )
-        bench = VirtualBench(bus, None, plant)
-        for text in options.set:
-            _store(bench, text)
-    except (CanDriverError, HydraulicSimError, ValueError, OSError) as error:
-        print(f"virtual_bench: {error}", file=sys.stderr)
-        return 2
+    bus = load_bus(options.bus)
+    bus = replace(
+        bus,
+        interface=options.interface or bus.interface,
+        channel=options.channel or bus.channel,
+        rate=options.rate or bus.rate,
+    )
+    faults = [_fault(text, bus) for text in options.fault]
+    plant = ModelPlant(
+        load_model(options.model),
+        bus.rate,
+        options.initial_position,
+        options.position_noise,
+        options.pressure_noise,
+        options.noise_seed,
+    )
+    bench = VirtualBench(bus, None, plant)
+    for text in options.set:
+        _store(bench, text)
     return _run(bench, faults, options.model, leave)
 
 
@@ -108,10 +106,10 @@ def _store(bench: VirtualBench, text: str) -> None:
     """Apply ``[NODE:]0xINDEX[:SUB]=VALUE``."""
     found = _SETTING.fullmatch(text)
     if found is None:
-        raise ValueError(f"--set {text}: expected [NODE:]0xINDEX[:SUB]=VALUE, such as 0x6324:1=200")
+        raise cli.UsageError(f"--set {text}: expected [NODE:]0xINDEX[:SUB]=VALUE, such as 0x6324:1=200")
     name = found["node"] or bench.valve.name
     if name not in bench.devices:
-        raise ValueError(f"--set {text}: there is no node {name}; there are {', '.join(bench.devices)}")
+        raise cli.UsageError(f"--set {text}: there is no node {name}; there are {', '.join(bench.devices)}")
     bench.devices[name].store(int(found["index"], 16), int(found["sub"] or 0), int(found["value"], 0))
 
 
@@ -119,18 +117,19 @@ def _fault(text: str, bus: Bus) -> tuple[Fault, float, float]:
     """Fault, begin and end [s] of ``NAME:NODE@BEGIN[-END]``."""
     found = _FAULT.fullmatch(text)
     if found is None or found["name"] not in FAULTS:
-        raise ValueError(f"--fault {text}: expected NAME:NODE@BEGIN[-END] in s; names: {', '.join(FAULTS)}")
+        raise cli.UsageError(f"--fault {text}: expected NAME:NODE@BEGIN[-END] in s; names: {', '.join(FAULTS)}")
     if found["node"] not in bus.nodes:
-        raise ValueError(f"--fault {text}: there is no node {found['node']}; there are {', '.join(bus.nodes)}")
+        raise cli.UsageError(f"--fault {text}: there is no node {found['node']}; there are {', '.join(bus.nodes)}")
     fault = FAULTS[found["name"]](found["node"])
     kinds = fault.profiles
     if kinds and bus.nodes[found["node"]].profile not in kinds:
-        raise ValueError(f"--fault {text}: {found['node']} cannot have it; only profile {', '.join(map(str, kinds))}")
+        only = ", ".join(map(str, kinds))
+        raise cli.UsageError(f"--fault {text}: {found['node']} cannot have it; only profile {only}")
     return fault, float(found["begin"]), float(found["end"] or 0.0)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="virtual_bench", description=(__doc__ or "").partition("\n\n")[2])
+    parser = cli.parser("virtual_bench", __doc__.partition("\n\n")[2])
     add = parser.add_argument
     add("--bus", default="bench", help="bus file, or the name of a shipped one (default: %(default)s)")
     add("--interface", default="", help="python-can interface: socketcan, udp_multicast (default: the bus file's)")

@@ -1,0 +1,31 @@
+"""What `diagnose` and `add` show on the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+
+from hydraulic_node_utils import tables
+
+_SHOWN = 8
+
+
+def show(result: dict[str, Any], console: Console) -> None:
+    """The table of effects and the sentence a user reads."""
+    rows = [
+        (
+            "→" if row["added"] else "", row["name"], row["subsystem"], f"{row['residual_before']:.4g}",
+            f"{row['residual_after']:.4g}", ", ".join(_value(p) for p in row["parameters"]),
+        )
+        for row in result["effects"][:_SHOWN]
+    ]  # fmt: skip
+    columns = ("", "effect", "acts on", ">before", ">after", "parameters")
+    console.print(tables.table(f"{result['model']['name']}: residual over noise on validation data", columns, rows))
+    console.print(result["verdict"]["text"])
+
+
+def _value(parameter: dict[str, Any]) -> str:
+    error, unit = parameter["standard_error"], parameter["unit"]
+    spread = f" ± {error:.2g}" if error is not None and error < float("inf") else ""
+    return f"{parameter['key'].split('.')[1]} {parameter['value']:.4g}{spread}{'' if unit == '1' else ' ' + unit}"

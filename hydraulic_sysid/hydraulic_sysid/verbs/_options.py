@@ -1,0 +1,207 @@
+"""What the verbs of this package share: options that several of them have, and the way from options to a page.
+
+A verb reads::
+
+    def main(argv: list[str] | None = None) -> int:
+        parser = opt.parser("compare", __doc__, EPILOG)
+        opt.add_model_option(parser)
+        opt.add_record_options(parser)
+        return opt.run(parser, _compare, _show, argv)
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from hydraulic_node_utils import cli, tables
+from hydraulic_sysid.data import results
+from hydraulic_sysid.data.records import Record, read_all
+
+MODEL = "model.yaml"
+Say = Callable[[str], None]
+"""Takes what is being done now, for the line that a user watches meanwhile."""
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a verb has come to: its document, what writes further files into the run's folder, and whether it is well.
+
+    The exit code is 0, or 1 where ``good`` is false.
+    """
+
+    result: dict[str, Any]
+    files: Mapping[str, Callable[[Path], object]] = field(default_factory=dict)
+    good: bool = True
+
+
+def parser(verb: str, doc: str, epilog: str | None = None) -> argparse.ArgumentParser:
+    """The parser of a verb, described by the first line of its module's docstring."""
+    return cli.parser(f"hydraulic_sysid {verb}", doc.partition("\n")[0], epilog)
+
+
+def run(
+    parser: argparse.ArgumentParser,
+    work: Callable[[argparse.Namespace, Say], Done],
+    show: Callable[[dict[str, Any], Console], None],
+    argv: Sequence[str] | None = None,
+    bulky: Sequence[str] = (),
+) -> int:
+    """Do a verb's work; keep its document, files and page in ``--out``; show it as a table or, with ``--json``, as it
+    is but for its ``bulky`` entries. Returns the exit code."""
+    verb = parser.prog.rpartition(" ")[2]
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="folder of the results; others in it are kept"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the result as JSON (without traces) instead of a table"
+    )
+
+    def action(options: argparse.Namespace) -> int:
+        folder: Path = options.out
+        results.check_target(folder, verb)
+        with Console(stderr=True).status(f"{verb} …") as status:
+            done = work(options, lambda text: status.update(f"{text} …"))
+            status.update("writing the report …")
+            results.write_result(folder, done.result)
+            for name, write in done.files.items():
+                write(folder / name)
+            from hydraulic_sysid.report import write_page  # takes long to import, and --help needs none
+
+            page = write_page(folder, results.read_folder(folder))
+        if options.json:
+            slim = _without(results.plain(done.result), bulky)
+            print(json.dumps(slim, indent=2, ensure_ascii=False, allow_nan=False))
+        else:
+            show(done.result, tables.console())
+            print("", *(folder / name for name in done.files), page, sep="\n")
+        return cli.OK if done.good else cli.NEGATIVE
+
+    return cli.run(parser, action, argv)
+
+
+def _without(value: Any, names: Sequence[str]) -> Any:
+    """The document without the entries of those names, wherever they stand: what fits a terminal or a pipe."""
+    if isinstance(value, dict):
+        return {k: _without(v, names) for k, v in value.items() if k not in names}
+    return [_without(v, names) for v in value] if isinstance(value, list) else value
+
+
+def add_model_option(parser: argparse.ArgumentParser, what: str = "model file, or the name of a preset") -> None:
+    """``--model FILE``; read it with `load_model`."""
+    parser.add_argument("--model", metavar="FILE", required=True, help=what)
+
+
+def add_record_options(parser: argparse.ArgumentParser, *, required: bool = True, window: bool = True) -> None:
+    """``--record PATH …``, ``--columns MAP`` and ``--window T0 T1``; read them with `read_records`."""
+    parser.add_argument(
+        "--record",
+        metavar="PATH",
+        type=Path,
+        nargs="+",
+        action="extend",
+        required=required,
+        default=None if required else [],
+        help="record to read: bag folder, .csv, .csv.gz, .mat, or a folder of such",
+    )
+    parser.add_argument(
+        "--columns",
+        metavar="MAP",
+        help="column map of CSV and MAT records: a YAML file or the name of a map that is shipped",
+    )
+    if window:
+        parser.add_argument(
+            "--window", metavar=("T0", "T1"), type=float, nargs=2, help="use this part of every record only, in seconds"
+        )
+
+
+def read_records(options: argparse.Namespace) -> list[Record]:
+    """The records that the command line names, or their part; none where it names none."""
+    records = read_all(options.record, options.columns) if options.record else []
+    window = getattr(options, "window", None)
+    return [r.window(*window) for r in records] if window else records
+
+
+def read_held_out(paths: list[Path] | None, options: argparse.Namespace) -> list[Record]:
+    """Records that an option of their own names; none where it does not."""
+    return read_all(paths, options.columns) if paths else []
+
+
+def add_part_options(parser: argparse.ArgumentParser, part: float) -> None:
+    """``--holdout PART`` or ``--holdout-record PATH …``: what is kept from the fit."""
+    held = parser.add_mutually_exclusive_group()
+    held.add_argument(
+        "--holdout", metavar="PART", type=float, default=part,
+        help=f"last part of every record to hold out (default {part:g})",
+    )  # fmt: skip
+    held.add_argument("--holdout-record", metavar="PATH", type=Path, nargs="+", help="records to hold out instead")
+
+
+def add_channel_options(parser: argparse.ArgumentParser) -> None:
+    """``--input`` and ``--output``: the channels that a linear model stands between."""
+    parser.add_argument("--input", metavar="CHANNEL", default="drive", help="input channel (default drive)")
+    parser.add_argument("--output", metavar="CHANNEL", default="position", help="output channel (default position)")
+
+
+def add_period_options(parser: argparse.ArgumentParser) -> None:
+    """``--period`` and ``--start`` of an excitation that no plan describes."""
+    parser.add_argument("--period", metavar="SECONDS", type=float, help="of the excitation, where no plan tells it")
+    parser.add_argument("--start", metavar="SECONDS", type=float, default=0.0, help="where its periods begin")
+
+
+def add_diagnosis_options(parser: argparse.ArgumentParser) -> None:
+    """Model, records, held-out records, length of a segment."""
+    add_model_option(parser)
+    add_record_options(parser)
+    parser.add_argument(
+        "--holdout",
+        metavar="PATH",
+        type=Path,
+        nargs="+",
+        help="records that no fit sees (default: every third stretch of every record)",
+    )
+    add_piece_option(parser)
+
+
+def add_piece_option(parser: argparse.ArgumentParser) -> None:
+    """``--piece SECONDS``: how long the segments are whose initial states are fitted along."""
+    parser.add_argument("--piece", metavar="SECONDS", type=float, default=0.5, help="length of a piece (default 0.5)")
+
+
+LIMITS = {
+    "drive": ("V", "largest drive"),
+    "travel": ("m", "largest distance from the centre"),
+    "velocity": ("m/s", "largest speed"),
+    "pressure_min": ("Pa", "least pressure of a chamber"),
+    "pressure_max": ("Pa", "largest pressure of a chamber"),
+}
+
+
+def add_limit_options(parser: argparse.ArgumentParser, default: str) -> None:
+    """One option for each of `LIMITS`, with where its default comes from; read them with `given_limits`."""
+    for name, (unit, what) in LIMITS.items():
+        option = f"--{name.replace('_', '-')}"
+        parser.add_argument(option, metavar=unit, type=float, help=f"{what} (default: from the {default})")
+
+
+def given_limits(options: argparse.Namespace) -> dict[str, float]:
+    """The limits that the command line sets, by name."""
+    return {name: getattr(options, name) for name in LIMITS if getattr(options, name) is not None}
+
+
+def check_new(folder: Path, *patterns: str, what: str = "model") -> None:
+    """Find out before the work that none of the files is there yet.
+
+    :raises UsageError: one is there.
+    """
+    found = sorted(file for pattern in patterns for file in folder.glob(pattern))
+    if found:
+        raise cli.UsageError(
+            f"{', '.join(map(str, found))} exists; choose another folder (a {what} is never overwritten)"
+        )
