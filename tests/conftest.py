@@ -128,10 +128,11 @@ def launch(ros_domain: int, tmp_path: Path) -> Iterator[Callable[..., Process]]:
 @pytest.fixture(scope="session")
 def compiled_physics() -> None:
     """The plant's kernels in the cache on disk, so that no node has to compile them while a test waits for it."""
+    from hydraulic_sim.live import LivePlant
     from hydraulic_sim.model_file import load_model
     from hydraulic_sim.plant import Plant
 
-    Plant(load_model("sample_bench")).live().step(0.0, 1e-3)
+    LivePlant(Plant(load_model("sample_bench"))).step(0.0, 1e-3)
 
 
 class Client:

@@ -14,7 +14,7 @@ import numpy as np
 from hydraulic_control.compiled_loop import physical
 from hydraulic_control.controller import Controller
 from hydraulic_control.response import Array, Response
-from hydraulic_sim.embedded import embedded
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 
@@ -54,7 +54,7 @@ class SimulatedPlant:
     def __init__(self, model: Model, noise: SensorNoise = SensorNoise(), seed: int = 0, position: float = 0.0) -> None:
         self._plant = Plant(model)
         self._start = self._plant.initial_state(position=position)
-        self._live = self._plant.live(self._start)
+        self._live = LivePlant(self._plant, self._start)
         self._areas = np.array([self._plant.value("piston_area_a"), self._plant.value("piston_area_b")])
         self._generator, self._resolution = np.random.default_rng(seed), noise.resolution
         self._scale = np.array([noise.position, noise.pressure * float(np.hypot(*self._areas))])
@@ -71,7 +71,7 @@ class SimulatedPlant:
 
     def close_loop(self, controller: Controller, wanted: Array, dt: float) -> tuple[Array, int]:
         """See `LoopPlant`; always from where the plant was made, compiled."""
-        pieces = embedded(self._plant)
+        pieces = self._plant.embedded()
         noise = self._scale * self._generator.standard_normal((len(wanted), 2))
         out = np.full((len(wanted), 2), np.nan)
         done = physical(

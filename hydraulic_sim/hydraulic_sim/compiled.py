@@ -90,7 +90,7 @@ def _load(library: Library) -> ModuleType:
     try:
         return _execute(file, text, library)
     except NumbaError as error:
-        raise EffectError(_blame(library, error)) from error
+        raise EffectError(_complaint(library, error)) from error
     except Exception:  # a cache that another version or a crash left unreadable is worth one clean attempt
         _set_aside(file.parent)
     try:
@@ -98,7 +98,7 @@ def _load(library: Library) -> ModuleType:
     except OSError:
         raise
     except Exception as error:
-        raise EffectError(_blame(library, error)) from error
+        raise EffectError(_complaint(library, error)) from error
 
 
 def _set_aside(folder: Path) -> None:
@@ -109,7 +109,7 @@ def _set_aside(folder: Path) -> None:
     shutil.rmtree(aside, ignore_errors=True)
 
 
-def _blame(library: Library, error: Exception) -> str:
+def _complaint(library: Library, error: Exception) -> str:
     """What does not compile, and in which effect's file: numba's complaint, short of its way through the plant."""
     lines = [line.strip() for line in f"{error}".splitlines() if line.strip()]
     own = [str(library.source_file(name)) for name in library if not library.is_builtin(name)]

@@ -7,7 +7,7 @@ no second list of effects anywhere.
 A kernel is an ordinary function of scalars; numba compiles it. Its *argument names* say what it wants:
 
 - a parameter or a state of the effect itself, by its name;
-- a signal of the plant (`slots.SIGNALS`), such as ``velocity`` or ``load_pressure``;
+- a signal of the plant (`slots.SIGNALS`), such as ``velocity`` or ``pressure_difference``;
 - a base parameter (`base.PARAMETERS`), such as ``moving_mass``;
 - a parameter of another effect, declared in ``uses`` as ``{"argument": "effect.parameter"}`` (zero while that
   effect is off);

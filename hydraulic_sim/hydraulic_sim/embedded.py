@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import base, rates
-from .plant import Plant
+from . import base
 from .trajectory import Array
 
 POSITION, VELOCITY, PRESSURE_A, PRESSURE_B, TRUE_POSITION = (
@@ -29,16 +28,3 @@ class Embedded(NamedTuple):
     parameters: Array
     hydraulic: np.uint8
     outputs: int
-
-
-def embedded(plant: Plant) -> Embedded:
-    """The pieces of a plant; the arrays are its own and are not to be written to."""
-    return Embedded(
-        plant._compiled.run,
-        plant.longest_step,
-        rates.STEP_TIMES_LANDS * plant.refinement,
-        plant._on,
-        plant._parameters,
-        plant._hydraulic,
-        len(base.OUTPUTS),
-    )

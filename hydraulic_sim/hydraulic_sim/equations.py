@@ -9,7 +9,8 @@ from __future__ import annotations
 RHS = """
 t = now
 position = S[0]; velocity = S[1]; pressure_a = S[2]; pressure_b = S[3]; stick = S[{stick}]
-load_pressure = pressure_a - pressure_b
+pressure_difference = pressure_a - pressure_b
+load_pressure = pressure_a - pressure_b * piston_area_b / piston_area_a
 viscosity = 1.0
 {viscosity}
 spool = command
@@ -117,7 +118,8 @@ def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure
         t = now
         command = clamp(drive[k] / drive_limit, -1.0, 1.0)
         position = X[0]; velocity = X[1]; pressure_a = X[2]; pressure_b = X[3]
-        load_pressure = pressure_a - pressure_b
+        pressure_difference = pressure_a - pressure_b
+        load_pressure = pressure_a - pressure_b * piston_area_b / piston_area_a
         {command}
         remaining = dt
         count = 0
@@ -192,7 +194,8 @@ def prime(drive, dt, start, on, P, X, M):
     {constants1}
     {switches1}
     position = X[0]; velocity = X[1]; pressure_a = X[2]; pressure_b = X[3]
-    load_pressure = pressure_a - pressure_b
+    pressure_difference = pressure_a - pressure_b
+    load_pressure = pressure_a - pressure_b * piston_area_b / piston_area_a
     if any_command:
         for k in range(len(drive)):
             t = start + k * dt
@@ -223,7 +226,7 @@ def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memorie
 @njit("i8(f8[::1], f8, f8, f8, f8[:, ::1], i8, i8[::1], u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1],"
       " f8[:, ::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
 def track(drive, dt, max_step, max_turn, seen, every, starts, on, P, hydraulic, X, M, states, memories, failure):
-    """Runs along ``drive``, led every so many samples by what is seen of the first states; keeps X and M at starts."""
+    """Runs along ``drive``, set every so many samples to what is seen of the first states; keeps X and M at starts."""
     Y = np.empty((every, 10))
     k = 0
     for i in range(len(starts)):

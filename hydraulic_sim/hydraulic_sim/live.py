@@ -14,7 +14,10 @@ from .trajectory import PlantState, PlantValues
 class LivePlant:
     """One running plant; `step` costs a few microseconds. Not to be shared between threads."""
 
-    def __init__(self, plant: Plant, initial: PlantState) -> None:
+    def __init__(self, plant: Plant, initial: PlantState | None = None) -> None:
+        """From ``initial``, by default rest in mid stroke. Raises `SimulationError` for a state of another library."""
+        initial = initial or plant.initial_state()
+        plant.check_state(initial)
         self.plant = plant
         self._state = initial.states.copy()
         self._memory = initial.memory.copy()
@@ -31,7 +34,7 @@ class LivePlant:
         """
         applied = min(max(drive, -self._limit), self._limit)
         self._drive[0] = applied
-        self.plant._advance(self._drive, dt, self._time, self._state, self._memory, self._out)
+        self.plant.advance(self._drive, dt, self._time, self._state, self._memory, self._out)
         self._time += dt
         x, v, p_a, p_b, p_s, spool = self._out[0, :6].tolist()
         return PlantValues(x, v, p_a, p_b, p_s, spool, p_a * self._areas[0] - p_b * self._areas[1], applied)

@@ -91,6 +91,11 @@ class Model:
         """The parameters that a fit may move."""
         return tuple(key for key in self.keys() if self.entry(key).free)
 
+    def movable_keys(self) -> tuple[str, ...]:
+        """What a fit may move: the free parameters, and those that only smooth the corner of a law."""
+        movable = {*self.free_keys(), *self.nuisance_keys()}
+        return tuple(key for key in self.keys() if key in movable)
+
     def nuisance_keys(self) -> tuple[str, ...]:
         """Parameters that only smooth the corner of a law which is on, unless the model calls them fixed."""
         laws = [self._effect(name) for name in self.effects]

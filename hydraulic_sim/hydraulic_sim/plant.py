@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import base, rates
 from .compiled import compiled
+from .embedded import Embedded
 from .errors import SimulationError
 from .model import Model
 from .trajectory import Array, PlantState, Trajectory
-
-if TYPE_CHECKING:
-    from .live import LivePlant
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
 MOST_HALVINGS = 6
-LED_EVERY = 4  # samples after which a tracked plant is set to what was seen
+CORRECTED_EVERY = 4  # samples after which a tracked plant is set to what was measured
 
 
 class Plant:
@@ -55,6 +54,16 @@ class Plant:
     def _values(self) -> dict[str, float]:
         return dict(zip(self.layout.parameters, self._parameters.tolist(), strict=True))
 
+    @classmethod
+    def at_rate(cls, model: Model, rate: float) -> Plant:
+        """The plant of a model, its step fine enough for drives sampled at ``rate`` [Hz] (see `following`).
+
+        Tried on half a second of a sweep from 1 to 40 Hz at a third of the drive. Raises `SimulationError`.
+        """
+        t = np.arange(max(2, round(0.5 * rate))) / rate
+        sweep = model.value("drive_limit") / 3.0 * np.sin(2.0 * np.pi * (1.0 + 39.0 * t) * t)
+        return cls(model).following(sweep, 1.0 / rate)
+
     @property
     def state_names(self) -> tuple[str, ...]:
         return tuple(self.layout.states)
@@ -65,8 +74,7 @@ class Plant:
         The integrator's step stays as it is, so that a small change of a value changes results smoothly, unless
         the physics becomes more than twice too fast for it. Raises `ModelError` for an unknown key.
         """
-        other = object.__new__(Plant)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other._parameters = self._parameters.copy()
         for key, value in values.items():
             try:
@@ -129,10 +137,10 @@ class Plant:
         if u.ndim != 1 or not np.all(np.isfinite(u)):
             raise SimulationError("the drive must be a one-dimensional array of finite volts")
         begin = initial or self.initial_state(drive=float(u[0]) if len(u) else 0.0)
-        self._check_state(begin)
+        self.check_state(begin)
         x, memory = begin.states.copy(), begin.memory.copy()
         out = np.empty((len(u), len(base.OUTPUTS)))
-        self._advance(u, dt, begin.time, x, memory, out)
+        self.advance(u, dt, begin.time, x, memory, out)
         columns = {name: out[:, i] for i, name in enumerate(base.OUTPUTS)}
         limit = self.value("drive_limit")
         force = columns["pressure_a"] * self.value("piston_area_a") - columns["pressure_b"] * self.value(
@@ -179,10 +187,9 @@ class Plant:
         past = LONGEST_MEMORY if self._remembers and memories is None else 0
         if memories is None:
             memories = np.zeros((len(first), self.layout.n_memory))
-        turn = rates.STEP_TIMES_LANDS * self.refinement
         done = self._compiled.run_many(
-            u, dt, self.longest_step, turn, first, horizon + 1, past, states, memories, self._on, self._parameters,
-            self._hydraulic, out, failure,
+            u, dt, self.longest_step, self._turn, first, horizon + 1, past, states, memories, self._on,
+            self._parameters, self._hydraulic, out, failure,
         )  # fmt: skip
         if done < len(first):
             start = int(first[done])
@@ -196,39 +203,38 @@ class Plant:
         return any(e.states or (e.slot == "command" and e.memory and e.reach is None) for e in self._active)
 
     def track(self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike) -> tuple[Array, Array]:
-        """What the states that no sensor sees have become at each start, the others led by what was seen.
+        """States at each start, those that no sensor sees propagated along the record, the others as measured.
 
         ``drive`` (N,) [V]; ``starts`` (S,) rising sample indices; ``seen`` (N, 4): position, velocity, pressures of
         A and B as measured, NaN where they were not. Returns the states (S, n_states) and memories (S, n_memory);
-        those of the position's sensor begin anew, as what was seen has passed it. Raises `SimulationError`.
+        those of the position's sensor begin anew, as what was measured has passed it. Raises `SimulationError`.
         """
         u = np.require(drive, np.float64, ("C", "W"))
         first = np.require(starts, np.int64, ("C", "W"))
-        led = np.require(seen, np.float64, ("C", "W"))
-        if led.shape != (len(u), 4):
-            raise SimulationError(f"what was seen has the shape {led.shape}; expected {(len(u), 4)}")
+        measured = np.require(seen, np.float64, ("C", "W"))
+        if measured.shape != (len(u), 4):
+            raise SimulationError(f"what was measured has the shape {measured.shape}; expected {(len(u), 4)}")
         if len(first) and (first[0] < 0 or first[-1] >= len(u) or np.any(np.diff(first) < 0)):
             raise SimulationError(f"the starts must rise within 0…{len(u) - 1}")
         self._check_dt(dt)
         begin = self.initial_state(drive=float(u[0]))
         x, memory, failure = begin.states.copy(), begin.memory.copy(), np.zeros(2)
         states, memories = np.empty((len(first), x.size)), np.empty((len(first), memory.size))
-        turn = rates.STEP_TIMES_LANDS * self.refinement
         done = self._compiled.track(
-            u, dt, self.longest_step, turn, led, LED_EVERY, first, self._on, self._parameters, self._hydraulic, x,
-            memory, states, memories, failure,
+            u, dt, self.longest_step, self._turn, measured, CORRECTED_EVERY, first, self._on, self._parameters,
+            self._hydraulic, x, memory, states, memories, failure,
         )  # fmt: skip
         if done < len(first):
             sample = min(max(int(failure[0] / dt + 1e-6), 0), len(u) - 1)
-            where = ", ".join(f"{name}={value:.6g}" for name, value in zip(self.layout.states, x, strict=True))
-            raise SimulationError(f"the plant led along its record failed at sample {sample}; state reached: {where}")
+            where = _named(self.layout.states, x)
+            raise SimulationError(f"propagation along the record failed at sample {sample}; state reached: {where}")
         for name, place in self.layout.memories.items():
             if self.layout.library[name].slot.endswith("_sensor"):
                 memories[:, place] = 0.0
         return states, memories
 
-    def _check_state(self, state: PlantState) -> None:
-        """Compiled code trusts the lengths; those of another library's state differ."""
+    def check_state(self, state: PlantState) -> None:
+        """Raise `SimulationError` for a state of another library: compiled code trusts the lengths."""
         found, expected = (
             (state.states.shape, state.memory.shape),
             ((len(self.layout.states),), (self.layout.n_memory,)),
@@ -246,19 +252,33 @@ class Plant:
                 f"the sampling interval is {dt:g} s; the memory of a delay needs at least {self._shortest_dt:g} s"
             )
 
-    def _advance(self, u: Array, dt: float, start: float, x: Array, memory: Array, out: Array) -> None:
+    @property
+    def _turn(self) -> float:
+        """How much of the rate of the oil through the lands one step may cover."""
+        return rates.STEP_TIMES_LANDS * self.refinement
+
+    def advance(self, u: Array, dt: float, start: float, x: Array, memory: Array, out: Array) -> None:
+        """Move the state ``x`` and ``memory`` on in place over ``u`` (N,) [V] from the time ``start`` [s].
+
+        ``out`` (N, n_outputs) takes the outputs. Raises `SimulationError` as `simulate` does.
+        """
         self._check_dt(dt)
         failure = np.zeros(2)
-        turn = rates.STEP_TIMES_LANDS * self.refinement
         done = self._compiled.run(
-            u, dt, start, self.longest_step, turn, self._on, self._parameters, self._hydraulic, x, memory, out, failure
-        )
+            u, dt, start, self.longest_step, self._turn, self._on, self._parameters, self._hydraulic, x, memory, out,
+            failure,
+        )  # fmt: skip
         if done < len(u):
-            where = ", ".join(f"{name}={value:.6g}" for name, value in zip(self.layout.states, x, strict=True))
-            raise self._failed(failure, done, u, out[done], f"state reached: {where}")
+            raise self._failed(failure, done, u, out[done], f"state reached: {_named(self.layout.states, x)}")
+
+    def embedded(self) -> Embedded:
+        """What compiled code of others needs to run this plant; the arrays are its own and not to be written to."""
+        return Embedded(
+            self._compiled.run, self.longest_step, self._turn, self._on, self._parameters, self._hydraulic,
+            len(base.OUTPUTS),
+        )  # fmt: skip
 
     def _failed(self, failure: Array, sample: int, u: Array, outputs: Array, more: str) -> SimulationError:
-        seen = ", ".join(f"{name}={value:.6g}" for name, value in zip(base.OUTPUTS, outputs, strict=True))
         why = (
             "a state is no longer finite"
             if failure[1] == 0.0
@@ -266,7 +286,7 @@ class Plant:
         )
         return SimulationError(
             f"{why} at t = {failure[0]:.6g} s (sample {sample}); drive {u[sample]:.6g} V, "
-            f"before it {u[max(sample - 1, 0)]:.6g} V; at the sample: {seen}; {more}"
+            f"before it {u[max(sample - 1, 0)]:.6g} V; at the sample: {_named(base.OUTPUTS, outputs)}; {more}"
         )
 
     def derivative(self, state: Array, drive: float, time: float = 0.0) -> tuple[Array, dict[str, float]]:
@@ -279,7 +299,7 @@ class Plant:
         total = len(self.layout.states)
         slope, rate, goal, seen = np.zeros(total), np.zeros(total - n), np.zeros(total - n), np.zeros(11)
         x = np.require(state, np.float64, ("C", "W"))
-        self._check_state(PlantState(x, np.zeros(self.layout.n_memory)))
+        self.check_state(PlantState(x, np.zeros(self.layout.n_memory)))
         command = max(-1.0, min(1.0, drive / self.value("drive_limit")))
         self._compiled.rhs(time, x, command, self._on, self._parameters, self._hydraulic, slope, rate, goal, seen)
         slope[n:] = rate * (goal - x[n:])
@@ -325,16 +345,11 @@ class Plant:
 
     def _halved(self, dt: float) -> Plant:
         """This plant with every step half as long."""
-        other = object.__new__(Plant)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other.longest_step = 0.5 * min(self.longest_step, dt)
         other.refinement = 0.5 * self.refinement
         return other
 
-    def live(self, initial: PlantState | None = None) -> LivePlant:
-        """A plant to be stepped sample by sample, as a node does."""
-        from .live import LivePlant
 
-        begin = initial or self.initial_state()
-        self._check_state(begin)
-        return LivePlant(self, begin)
+def _named(names: Iterable[str], values: Array) -> str:
+    return ", ".join(f"{name}={value:.6g}" for name, value in zip(names, values, strict=True))

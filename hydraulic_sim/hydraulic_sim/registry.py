@@ -13,12 +13,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-from . import base, effects, slots, trial
+from . import base, effects, slots
 from .effect import Effect, Parameter, arguments
+from .effect_check import check_effect
 from .errors import EffectError
 
 
-class Found(NamedTuple):
+class EffectFile(NamedTuple):
     """An effect, the file that defines it, and a hash of the text that was read from it."""
 
     effect: Effect
@@ -29,22 +30,22 @@ class Found(NamedTuple):
 class Library(Mapping[str, Effect]):
     """Effects by name, in a fixed order (by slot, order and name), with the sources they came from."""
 
-    def __init__(self, found: Iterable[Found]) -> None:
-        self._found: dict[str, Found] = {}
-        for entry in found:
+    def __init__(self, files: Iterable[EffectFile]) -> None:
+        self._files: dict[str, EffectFile] = {}
+        for entry in files:
             effect, path, _ = entry
-            if effect.name in self._found:
+            if effect.name in self._files:
                 raise EffectError(
-                    f"{path}: an effect named {effect.name!r} is already defined in {self._found[effect.name].path}"
+                    f"{path}: an effect named {effect.name!r} is already defined in {self._files[effect.name].path}"
                 )
             _check_slot(effect, path)
-            self._found[effect.name] = entry
+            self._files[effect.name] = entry
         position = {name: i for i, name in enumerate(slots.SLOTS)}
-        ordered = sorted((e.effect for e in self._found.values()), key=lambda e: (position[e.slot], e.order, e.name))
+        ordered = sorted((e.effect for e in self._files.values()), key=lambda e: (position[e.slot], e.order, e.name))
         self._effects = {e.name: e for e in ordered}
         self._extended: dict[tuple[tuple[Path, str], ...], Library] = {}
         for effect in ordered:
-            _check(effect, self._found[effect.name].path, self)
+            _check(effect, self._files[effect.name].path, self)
 
     def __getitem__(self, name: str) -> Effect:
         try:
@@ -63,15 +64,15 @@ class Library(Mapping[str, Effect]):
 
     def source_file(self, name: str) -> Path:
         """The file that defines the effect."""
-        return self.found(name).path
+        return self.file(name).path
 
     def is_builtin(self, name: str) -> bool:
         """Whether the effect ships with the package."""
         return str(self.source_file(name).parent) in effects.__path__
 
-    def found(self, name: str) -> Found:
+    def file(self, name: str) -> EffectFile:
         """The effect with its file and the hash of its text. Raises `EffectError` for an unknown name."""
-        return Found(self[name], *self._found[name][1:])
+        return EffectFile(self[name], *self._files[name][1:])
 
     def parameter(self, key: str) -> Parameter:
         """The parameter behind a key: ``moving_mass`` or ``coulomb_friction.force``. Raises `EffectError`."""
@@ -87,7 +88,7 @@ class Library(Mapping[str, Effect]):
     @cached_property
     def fingerprint(self) -> str:
         """A hash over the text that every effect was read from, so that compiled physics is never stale."""
-        return _digest("".join(f"{name} {self._found[name].digest}\n" for name in self).encode())
+        return _digest("".join(f"{name} {self._files[name].digest}\n" for name in self).encode())
 
     def with_files(self, files: Iterable[str | Path]) -> Library:
         """This library and the effects of the given files. Raises `EffectError`."""
@@ -96,20 +97,20 @@ class Library(Mapping[str, Effect]):
             return self
         key = tuple((f.path, f.digest) for f in added)
         if key not in self._extended:
-            extended = Library((*self._found.values(), *added))
-            for found in added:
-                trial.check(found.effect, found.path)
+            extended = Library((*self._files.values(), *added))
+            for entry in added:
+                check_effect(entry.effect, entry.path)
             self._extended[key] = extended
         return self._extended[key]
 
 
-def load_effect(path: Path) -> Found:
+def load_effect(path: Path) -> EffectFile:
     """Read one effect file; its name is the file's. Raises `EffectError`, naming the file."""
     path = path.expanduser().resolve()
     if not path.is_file():
         raise EffectError(f"{path}: there is no such effect file")
     source = path.read_bytes()
-    return Found(_executed(path, source), path, _digest(source))
+    return EffectFile(_executed(path, source), path, _digest(source))
 
 
 def _digest(content: bytes) -> str:
@@ -142,11 +143,11 @@ def _named(module: ModuleType, path: Path) -> Effect:
     return replace(effect, name=path.stem)
 
 
-def _builtin() -> Iterator[Found]:
+def _builtin() -> Iterator[EffectFile]:
     for info in pkgutil.iter_modules(effects.__path__):
         module = importlib.import_module(f"{effects.__name__}.{info.name}")
         path = Path(str(module.__file__))
-        yield Found(_named(module, path), path, _digest(path.read_bytes()))
+        yield EffectFile(_named(module, path), path, _digest(path.read_bytes()))
 
 
 _BUILTIN: list[Library] = []

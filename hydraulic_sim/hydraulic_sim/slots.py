@@ -63,7 +63,8 @@ SIGNALS: dict[str, tuple[int, str]] = {
     "velocity": (0, "piston velocity [m/s]"),
     "pressure_a": (0, "pressure in chamber A [Pa]"),
     "pressure_b": (0, "pressure in chamber B [Pa]"),
-    "load_pressure": (0, "p_A − p_B [Pa]"),
+    "pressure_difference": (0, "p_A − p_B [Pa]"),
+    "load_pressure": (0, "p_A − p_B·A_B/A_A, the force of the pressures over area A [Pa]"),
     "viscosity": (_ORDER["spool"], "factor on viscous terms, 1 at the start [-]"),
     "command": (0, "demanded opening, −1…1 [-]"),
     "spool": (_ORDER["opening"], "spool position, −1…1 [-]"),
@@ -77,7 +78,7 @@ SIGNALS: dict[str, tuple[int, str]] = {
     "acceleration": (len(SLOTS), "piston acceleration [m/s²]"),
     "direction": (_ORDER["force"], "direction of dry friction, −1…1 [-]"),
 }
-STATE_SIGNALS = ("t", "position", "velocity", "pressure_a", "pressure_b", "load_pressure")
+STATE_SIGNALS = ("t", "position", "velocity", "pressure_a", "pressure_b", "pressure_difference", "load_pressure")
 PER_SAMPLE = ("memory", "dt")
 
 

@@ -19,6 +19,7 @@ from hydraulic_can_driver.nodes import can_driver
 from hydraulic_can_driver.virtual import Reading, VirtualBench
 from hydraulic_can_driver.virtual.faults import StatusFault
 from hydraulic_can_driver.virtual.wiring import Event
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 
@@ -33,7 +34,7 @@ class Actuator:
     """The physics of a model file behind virtual devices."""
 
     def __init__(self, model: str) -> None:
-        self._live = Plant(load_model(model)).live()
+        self._live = LivePlant(Plant(load_model(model)))
 
     def step(self, drive: float, dt: float) -> Reading:
         """See `hydraulic_can_driver.virtual.Plant`."""

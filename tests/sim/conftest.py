@@ -74,6 +74,6 @@ def random_states() -> Callable[..., Iterator[tuple[Array, float]]]:
 def small_library(monkeypatch: pytest.MonkeyPatch, bare: Model) -> Model:
     """A library of the end stops alone, which compiles in seconds; returns a model that fits it."""
     full = registry.library()
-    small = registry.Library([full.found("end_stop")])
+    small = registry.Library([full.file("end_stop")])
     monkeypatch.setattr(registry, "_BUILTIN", [small])
     return replace(bare, entries={key: entry for key, entry in bare.entries.items() if "." not in key})

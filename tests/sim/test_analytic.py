@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.trajectory import PlantState
@@ -348,7 +349,7 @@ def test_a_delay_longer_than_its_memory_is_refused(hydraulic: Build, effect: str
     with pytest.raises(SimulationError, match=r"sampling interval is 0\.0001 s; .*delay needs at least 0\.00015"):
         plant.simulate(np.zeros(3), 1e-4)
     with pytest.raises(SimulationError, match="delay needs"):
-        plant.live().step(0.0, 1e-4)
+        LivePlant(plant).step(0.0, 1e-4)
     plant.with_parameters({f"{effect}.delay": 0.02}).simulate(np.zeros(3), 1e-4)
 
 
@@ -510,7 +511,7 @@ def test_momentum_is_kept_by_a_second_mass_and_across_a_gap(free: Build) -> None
         rate = next(i for name, i in states.items() if name.startswith(effect) and name.endswith("_rate"))
         start = plant.initial_state(velocity=0.4)
         start.states[rate] = -0.4  # the second mass rests at first
-        live = plant.live(start)
+        live = LivePlant(plant, start)
         for _ in range(3000):
             live.step(0.0, DT)
             x = live.state.states

@@ -10,6 +10,7 @@ import pytest
 
 from hydraulic_sim.batch import Job, scatter, simulate_batch
 from hydraulic_sim.errors import ModelError, SimulationError
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.trajectory import Trajectory
@@ -133,7 +134,7 @@ def test_a_run_in_two_parts_is_the_run(plant: Plant) -> None:
 def test_a_live_plant_does_what_a_simulation_does(plant: Plant) -> None:
     u = np.append(drive(400), [25.0, -25.0])
     start = plant.initial_state(position=0.1, drive=float(u[0]))
-    run, live = plant.simulate(u, DT, start), plant.live(start)
+    run, live = plant.simulate(u, DT, start), LivePlant(plant, start)
     stepped = [live.step(float(volts), DT) for volts in u]
     for channel in (*CHANNELS[:7], "drive"):
         seen = np.array([getattr(sample, channel) for sample in stepped])
@@ -145,7 +146,7 @@ def test_a_live_plant_does_what_a_simulation_does(plant: Plant) -> None:
 def test_a_live_plant_leaves_the_state_it_began_from_alone(plant: Plant) -> None:
     start = plant.initial_state()
     before = start.states.copy(), start.memory.copy()
-    plant.live(start).step(5.0, DT)
+    LivePlant(plant, start).step(5.0, DT)
     plant.simulate(drive(50), DT, start)
     assert np.array_equal(start.states, before[0]) and np.array_equal(start.memory, before[1])
 
@@ -157,7 +158,7 @@ def test_a_prediction_is_the_simulation_from_there(bare: Model, everything: Mode
         everything = everything.without_effect(name)
     for plant in (Plant(bare), Plant(everything)):
         u = drive(500)
-        live, states = plant.live(plant.initial_state(drive=float(u[0]))), []
+        live, states = LivePlant(plant, plant.initial_state(drive=float(u[0]))), []
         run = plant.simulate(u, DT)
         for volts in u:
             states.append(live.state.states)

@@ -13,6 +13,7 @@ import pytest
 from hydraulic_sim import base, slots
 from hydraulic_sim.effect import Effect, arguments
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.registry import library
@@ -284,7 +285,7 @@ def test_the_oil_that_flows_in_is_where_it_must_be(effect: Effect, with_effect: 
 
 def states_of(plant: Plant, drive: Array, dt: float, start: Any) -> Array:
     """Every state at every sample (n, n_states)."""
-    live = plant.live(start)
+    live = LivePlant(plant, start)
     states = []
     for u in drive:
         states.append(live.state.states)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.trajectory import PlantState
@@ -48,7 +49,7 @@ def test_a_drive_that_is_no_number_moves_nothing(bare: Model, volts: float) -> N
     drive[10] = volts
     with pytest.raises(SimulationError, match="finite volts"):
         plant.simulate(drive, DT)
-    live = plant.live()
+    live = LivePlant(plant)
     if np.isnan(volts):
         with pytest.raises(SimulationError, match=r"drive nan V"):
             live.step(volts, DT)
@@ -72,7 +73,7 @@ def test_a_state_of_another_length_is_refused(bare: Model) -> None:
     plant = Plant(bare)
     good = plant.initial_state()
     for wrong in (PlantState(good.states[:4], good.memory), PlantState(good.states, good.memory[:-1])):
-        for call in (lambda w: plant.simulate(np.zeros(3), DT, w), plant.live):
+        for call in (lambda w: plant.simulate(np.zeros(3), DT, w), lambda w: LivePlant(plant, w)):
             with pytest.raises(SimulationError, match="does not fit 'sample_bench'"):
                 call(wrong)
     with pytest.raises(SimulationError, match="does not fit"):

@@ -24,8 +24,8 @@ from hydraulic_sim.effect import Effect, Parameter
 GAIN = 2.0
 
 
-def flow(load_pressure, coefficient):
-    q = GAIN * coefficient * load_pressure
+def flow(pressure_difference, coefficient):
+    q = GAIN * coefficient * pressure_difference
     return -q, q
 
 
@@ -47,7 +47,7 @@ from hydraulic_sim import registry
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 
-registry._BUILTIN[:] = [registry.Library([registry.library().found("end_stop")])]
+registry._BUILTIN[:] = [registry.Library([registry.library().file("end_stop")])]
 plant = Plant(load_model(sys.argv[1]))
 print(plant.derivative(plant.initial_state(pressure_a=8e6, pressure_b=6e6).states, 0.0)[1]["flow_a"])
 """
@@ -102,7 +102,7 @@ def result(process: subprocess.Popen[str]) -> float:
 @pytest.fixture(scope="module")
 def workshop(tmp_path_factory: pytest.TempPathFactory, bare: Model) -> Iterator[Workshop]:
     with pytest.MonkeyPatch.context() as patch:
-        small = registry.Library([registry.library().found("end_stop")])
+        small = registry.Library([registry.library().file("end_stop")])
         patch.setattr(registry, "_BUILTIN", [small])
         folder = tmp_path_factory.mktemp("workshop")
         patch.setenv("HYDRAULIC_SIM_CACHE", str(folder / "cache"))
@@ -139,7 +139,7 @@ def test_an_edit_changes_the_physics_in_the_same_process(workshop: Workshop) -> 
     before = Plant(old)
     assert leak(before) == pytest.approx(4e-6, rel=1e-12)
     workshop.edit("q = GAIN * coefficient", "q = GAIN / coefficient")
-    workshop.edit("GAIN / coefficient * load", "GAIN * coefficient * load")
+    workshop.edit("GAIN / coefficient * pressure", "GAIN * coefficient * pressure")
     assert workshop.here() == leak(before)
     workshop.edit("return -q, q", "return q, -q")
     assert workshop.here() == pytest.approx(-4e-6, rel=1e-12)

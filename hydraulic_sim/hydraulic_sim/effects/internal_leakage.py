@@ -1,4 +1,4 @@
-"""Internal leakage: laminar flow past the piston, proportional to the load pressure.
+"""Internal leakage: laminar flow past the piston, proportional to the pressure difference.
 
     q_A = −μ⁻¹·Ci·(p_A − p_B),   q_B = −q_A      (μ: the viscosity factor, 1 unless `viscosity_drift` is on)
 
@@ -8,8 +8,8 @@ Source: Merritt (1967), Hydraulic Control Systems, ch. 6.
 from hydraulic_sim.effect import Effect, Parameter
 
 
-def flow(load_pressure, viscosity, coefficient):
-    q = coefficient * load_pressure / viscosity
+def flow(pressure_difference, viscosity, coefficient):
+    q = coefficient * pressure_difference / viscosity
     return -q, q
 
 
@@ -30,7 +30,7 @@ EFFECT = Effect(
     ),
     equation="q = Ci*(p_A - p_B)",
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",
-    excited_by="holding under load: the piston drifts in proportion to the load pressure",
+    excited_by="holding under load: the piston drifts in proportion to the pressure difference",
     confused_with=("viscous_friction", "valve_underlap"),
     alike_without_pressures="damping",
     told_apart_by="flow balance, not force balance",

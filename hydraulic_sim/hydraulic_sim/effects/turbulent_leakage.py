@@ -11,8 +11,8 @@ from hydraulic_sim.kernels import smooth_root_gain
 TRANSITION = 1e4  # Pa, drop below which the leak turns laminar
 
 
-def flow(load_pressure, coefficient):
-    q = coefficient * load_pressure * smooth_root_gain(load_pressure, TRANSITION)
+def flow(pressure_difference, coefficient):
+    q = coefficient * pressure_difference * smooth_root_gain(pressure_difference, TRANSITION)
     return -q, q
 
 

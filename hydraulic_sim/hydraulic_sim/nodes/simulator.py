@@ -12,12 +12,12 @@ from hydraulic_interfaces.samples import NAN, PlantSample
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_plant_node.nodes.running import run_plant
 from hydraulic_plant_node.plant_backend import BackendError, PlantBackend
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.nodes._extra_effects import switched
 from hydraulic_sim.nodes._sensors import Sensor
 from hydraulic_sim.plant import Plant
-from hydraulic_sim.trial_drive import trial_drive
 
 DEFAULT_MODEL = "moog_mcr_m_1002_bench"
 MODEL_PREFIX = "model."
@@ -74,7 +74,7 @@ class Simulator(PlantBackend):
         self._start = values["initial_position"]
         self._switch_at = half - values["limit_margin"]
         # Compiles or loads the kernels too, which must not happen in the first cycle.
-        self._live = Plant(model).following(trial_drive(model, values["rate"]), 1.0 / values["rate"]).live()
+        self._live = LivePlant(Plant.at_rate(model, values["rate"]))
         seeds = np.random.SeedSequence(values["noise_seed"]).spawn(5)
         self._position, self._velocity, *self._pressures = (Sensor(seed) for seed in seeds)
         for spec in SENSORS:
@@ -102,7 +102,7 @@ class Simulator(PlantBackend):
     def activate(self) -> None:
         """Start from rest at the initial position."""
         plant = self._live.plant
-        self._live = plant.live(plant.initial_state(position=self._start))
+        self._live = LivePlant(plant, plant.initial_state(position=self._start))
 
     def step(self, stamp_ns: int, drive: float, dt: float) -> PlantSample:
         """See `PlantBackend.step`."""

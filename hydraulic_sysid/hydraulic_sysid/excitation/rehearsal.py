@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import STARTED
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation.plan import Plan
@@ -52,7 +53,7 @@ def rehearse(plan: Plan, plant: Plant, sensors: Sensors | None = None, position:
     """
     sensors = sensors or Sensors()
     run = ExcitationRun(plan)
-    live = plant.live(plant.initial_state(position=plan.centre if position is None else position))
+    live = LivePlant(plant, plant.initial_state(position=plan.centre if position is None else position))
     count, dt = plan.time.size, 1.0 / plan.rate
     draw = np.random.default_rng(sensors.seed)
     noise = (sensors.position_noise * draw.standard_normal(count)).tolist()

@@ -18,7 +18,7 @@ BEFORE, AFTER = style.FREE_RUN, style.HORIZON
 _UNITS = {"position": "m", "pressure_a": "Pa", "pressure_b": "Pa", "drive": "V"}
 _VARIABLE_UNITS = {
     "velocity": "m/s", "speed": "m/s", "position": "m", "reading": "m", "opening": "1", "size_of_opening": "1",
-    "time": "s", "load_pressure": "Pa", "size_of_load_pressure": "Pa", "mean_pressure": "Pa",
+    "time": "s", "pressure_difference": "Pa", "size_of_pressure_difference": "Pa", "mean_pressure": "Pa",
 }  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from hydraulic_interfaces.errors import HydraulicError
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant, PlantState
 from hydraulic_sysid.data.records import Record
@@ -80,7 +81,7 @@ def start(plant: Plant, data: Measured) -> PlantState:
 
 def inner_states(plant: Plant, data: Measured) -> Array:
     """All states of the free run ``(N, n_states)``, each at its sample."""
-    live = plant.live(start(plant, data))
+    live = LivePlant(plant, start(plant, data))
     dt = data.record.dt
     states = np.empty((len(data.record), len(plant.state_names)))
     for k, volts in enumerate(data.record["drive"].tolist()):

@@ -56,7 +56,7 @@ def locate(
     """
     names = _names(model, records)
     balances = Balances(model, spool_measured="spool" in names)
-    keys = _movable(model) if names else []
+    keys = list(model.movable_keys()) if names else []
 
     studies: list[Study] = []
     verdict: Verdict | None = None
@@ -123,12 +123,6 @@ def judge(
         bounds.append((min((low - value) / size, -LEAST_MOVE), max((high - value) / size, LEAST_MOVE)))
     bounds += [(-np.inf, np.inf)] * (subsystems.count(PARAMETERS) - len(keys))
     return rank(own, twin, subsystems, variables, bounds)
-
-
-def _movable(model: Model) -> list[str]:
-    """Parameters that may still move: those a fit may move, and those that only smooth a law's corner."""
-    used = model.keys()
-    return [key for key in used if model.entry(key).free or model.parameter(key).nuisance]
 
 
 def _names(model: Model, records: Sequence[Record]) -> tuple[str, ...]:

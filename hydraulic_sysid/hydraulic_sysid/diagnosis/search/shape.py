@@ -103,7 +103,7 @@ def _seen(anchor: Anchor) -> dict[str, Array]:
         a = np.concatenate([p.seen[:, 2] for p in pieces])
         b = np.concatenate([p.seen[:, 3] for p in pieces])
         values |= {"pressure_a": a, "pressure_b": b, "mean_pressure": 0.5 * (a + b)}
-        values |= {"load_pressure": a - b, "size_of_load_pressure": np.abs(a - b)}
+        values |= {"pressure_difference": a - b, "size_of_pressure_difference": np.abs(a - b)}
     return values
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from hydraulic_interfaces.samples import NAN, PlantSample
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.trajectory import PlantState
@@ -30,7 +31,7 @@ class LiveModel:
         """Seconds between two starts from the measurement; 0: never again."""
         self.longest_gap = longest_gap
         self.restarts = 0
-        self._live = self.plant.live()
+        self._live = LivePlant(self.plant)
         self._last: PlantSample | None = None
         self._started_ns = 0
         self._past: deque[tuple[int, float]] = deque(maxlen=_SLOPE_SAMPLES)
@@ -82,7 +83,7 @@ class LiveModel:
         for name, value in found.items():
             if np.isfinite(value):
                 x[named[name]] = value
-        self._live = self.plant.live(PlantState(x, state.memory.copy(), state.time))
+        self._live = LivePlant(self.plant, PlantState(x, state.memory.copy(), state.time))
         self._started_ns = measured.stamp_ns
         self.restarts += 1
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from hydraulic_can_driver.virtual import Reading
 from hydraulic_sim.errors import ModelError
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
-from hydraulic_sim.trial_drive import trial_drive
 
 _BLOCK = 4096
 _CHANNELS = 4  # position and three pressures
@@ -36,9 +36,9 @@ class ModelPlant:
         half = 0.5 * model.value("stroke")
         if abs(position) > half:
             raise ModelError(f"initial position is {position:g} m; {model.name} allows {-half:g} … {half:g} m")
-        plant = Plant(model).following(trial_drive(model, rate), 1.0 / rate)
-        plant.live().step(0.0, 1.0 / rate)  # loads the compiled code, which must not happen on the bench
-        self._live = plant.live(plant.initial_state(position=position))
+        plant = Plant.at_rate(model, rate)
+        LivePlant(plant).step(0.0, 1.0 / rate)  # loads the compiled code, which must not happen on the bench
+        self._live = LivePlant(plant, plant.initial_state(position=position))
         self._hydraulic = model.kind == "hydraulic"
         self._scale = np.array([position_noise, *[pressure_noise] * (_CHANNELS - 1)])
         self._generator = np.random.default_rng(seed)

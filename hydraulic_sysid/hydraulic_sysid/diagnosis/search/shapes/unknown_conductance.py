@@ -10,19 +10,19 @@ Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 
 from hydraulic_sysid.diagnosis.search.shapes.triangle import curve
 
-VARIABLES = ("position", "time", "speed", "size_of_load_pressure")
+VARIABLES = ("position", "time", "speed", "size_of_pressure_difference")
 
 
-def add(position, t, velocity, load_pressure, over, centre, width, height):
+def add(position, t, velocity, pressure_difference, over, centre, width, height):
     z = position
     if over == 1.0:
         z = t
     elif over == 2.0:
         z = abs(velocity)
     elif over == 3.0:
-        z = abs(load_pressure)
+        z = abs(pressure_difference)
     part = 1.0 - abs(z - centre) / width
-    q = height * part * load_pressure if part > 0.0 else 0.0
+    q = height * part * pressure_difference if part > 0.0 else 0.0
     return -q, q
 
 

@@ -10,15 +10,15 @@ Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 
 from hydraulic_sysid.diagnosis.search.shapes.triangle import curve
 
-VARIABLES = ("velocity", "position", "load_pressure", "mean_pressure", "opening", "time")
+VARIABLES = ("velocity", "position", "pressure_difference", "mean_pressure", "opening", "time")
 
 
-def add(velocity, position, load_pressure, pressure_a, pressure_b, opening, t, over, centre, width, height):
+def add(velocity, position, pressure_difference, pressure_a, pressure_b, opening, t, over, centre, width, height):
     z = velocity
     if over == 1.0:
         z = position
     elif over == 2.0:
-        z = load_pressure
+        z = pressure_difference
     elif over == 3.0:
         z = 0.5 * (pressure_a + pressure_b)
     elif over == 4.0:

@@ -10,15 +10,15 @@ Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 
 from hydraulic_sysid.diagnosis.search.shapes.triangle import curve
 
-VARIABLES = ("position", "speed", "size_of_load_pressure", "mean_pressure", "time")
+VARIABLES = ("position", "speed", "size_of_pressure_difference", "mean_pressure", "time")
 
 
-def add(position, velocity, load_pressure, pressure_a, pressure_b, t, direction, over, centre, width, height):
+def add(position, velocity, pressure_difference, pressure_a, pressure_b, t, direction, over, centre, width, height):
     z = position
     if over == 1.0:
         z = abs(velocity)
     elif over == 2.0:
-        z = abs(load_pressure)
+        z = abs(pressure_difference)
     elif over == 3.0:
         z = 0.5 * (pressure_a + pressure_b)
     elif over == 4.0:

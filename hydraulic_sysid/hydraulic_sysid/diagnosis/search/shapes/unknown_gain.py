@@ -10,15 +10,15 @@ Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 
 from hydraulic_sysid.diagnosis.search.shapes.triangle import curve
 
-VARIABLES = ("position", "time", "load_pressure", "velocity")
+VARIABLES = ("position", "time", "pressure_difference", "velocity")
 
 
-def add(position, t, load_pressure, velocity, opening, over, centre, width, height):
+def add(position, t, pressure_difference, velocity, opening, over, centre, width, height):
     z = position
     if over == 1.0:
         z = t
     elif over == 2.0:
-        z = load_pressure
+        z = pressure_difference
     elif over == 3.0:
         z = velocity
     part = 1.0 - abs(z - centre) / width

@@ -10,11 +10,11 @@ Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 
 from hydraulic_sysid.diagnosis.search.shapes.triangle import curve
 
-VARIABLES = ("load_pressure", "position", "velocity", "opening", "time")
+VARIABLES = ("pressure_difference", "position", "velocity", "opening", "time")
 
 
-def add(load_pressure, position, velocity, opening, t, over, centre, width, height):
-    z = load_pressure
+def add(pressure_difference, position, velocity, opening, t, over, centre, width, height):
+    z = pressure_difference
     if over == 1.0:
         z = position
     elif over == 2.0:

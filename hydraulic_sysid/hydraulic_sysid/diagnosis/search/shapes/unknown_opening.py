@@ -10,15 +10,15 @@ Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 
 from hydraulic_sysid.diagnosis.search.shapes.triangle import curve
 
-VARIABLES = ("opening", "velocity", "load_pressure", "position", "time")
+VARIABLES = ("opening", "velocity", "pressure_difference", "position", "time")
 
 
-def add(opening, velocity, load_pressure, position, t, over, centre, width, height):
+def add(opening, velocity, pressure_difference, position, t, over, centre, width, height):
     z = opening
     if over == 1.0:
         z = velocity
     elif over == 2.0:
-        z = load_pressure
+        z = pressure_difference
     elif over == 3.0:
         z = position
     elif over == 4.0:

@@ -10,17 +10,17 @@ Source: linear splines, de Boor (1978), A Practical Guide to Splines, ch. III.
 
 from hydraulic_sysid.diagnosis.search.shapes.triangle import curve
 
-VARIABLES = ("size_of_opening", "velocity", "time", "load_pressure")
+VARIABLES = ("size_of_opening", "velocity", "time", "pressure_difference")
 
 
-def add(opening, velocity, t, load_pressure, over, centre, width, height):
+def add(opening, velocity, t, pressure_difference, over, centre, width, height):
     z = abs(opening)
     if over == 1.0:
         z = velocity
     elif over == 2.0:
         z = t
     elif over == 3.0:
-        z = load_pressure
+        z = pressure_difference
     part = 1.0 - abs(z - centre) / width
     return height * part if part > 0.0 else 0.0
 
