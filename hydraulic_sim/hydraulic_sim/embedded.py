@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import base
-from .trajectory import Array
+from .arrays import Array
 
 POSITION, VELOCITY, PRESSURE_A, PRESSURE_B, TRUE_POSITION = (
     base.OUTPUTS.index(name) for name in ("position", "velocity", "pressure_a", "pressure_b", "true_position")

@@ -16,11 +16,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from . import base
+from .arrays import Array
 from .effect import arguments
 from .errors import SimulationError
 from .model import Model
 from .plant import Plant
-from .trajectory import Array
 
 _FRACTION = 1e-5  # difference step, of a state's scale
 

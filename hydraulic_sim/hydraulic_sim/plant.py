@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import base, rates
+from .arrays import Array
 from .compiled import compiled
 from .embedded import Embedded
 from .errors import SimulationError
 from .model import Model
-from .trajectory import Array, PlantState, Trajectory
+from .trajectory import PlantState, Trajectory
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hydraulic_sim.arrays import Array
 
 
 def envelope(time: Array, values: Array, buckets: int = 700) -> tuple[Array, Array]:

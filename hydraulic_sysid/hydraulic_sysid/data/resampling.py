@@ -10,11 +10,10 @@ plant (Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed., ch. 2).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import RecordError
-
-Array = NDArray[np.float64]
 
 
 def held_average(drive: ArrayLike, dt: float, sampling_time: float) -> Array:

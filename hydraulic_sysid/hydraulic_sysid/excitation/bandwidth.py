@@ -26,12 +26,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.errors import HydraulicError
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from hydraulic_sim.arrays import Array, Complex, Mask
 
 GAIN_SHARE = 0.5
 """Of the critical gain, with which the position loop is closed."""
@@ -116,7 +113,7 @@ def _dense(frequency: Array, velocity: Complex) -> tuple[Array, Complex]:
     return f, np.interp(f, frequency, velocity.real) + 1j * np.interp(f, frequency, velocity.imag)
 
 
-def _first(where: NDArray[np.bool_]) -> int | None:
+def _first(where: Mask) -> int | None:
     """Index from which a condition holds for at least the distance of two lines: a single line may be noise."""
     runs = np.convolve(where, np.ones(2 * _DENSE + 1), mode="valid") > 2 * _DENSE + 0.5
     found = np.flatnonzero(runs)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hydraulic_sim.arrays import Array
 
 _STEPS = 300
 _OVERSAMPLING = 16

@@ -14,12 +14,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.results import write_text
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
 from hydraulic_sysid.excitation.prediction import Prediction
 from hydraulic_sysid.excitation.settings import Settings, number, section, text
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds
-from hydraulic_sysid.excitation.signals._base import Array
 
 PLAN_FOLDER = Path(__file__).parent / "plans"
 

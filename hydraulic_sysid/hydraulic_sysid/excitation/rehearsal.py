@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import STARTED
 from hydraulic_sim.live import LivePlant
@@ -14,8 +13,6 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation.plan import Plan
 from hydraulic_sysid.excitation.prediction import Prediction
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
-
-Array = NDArray[np.float64]
 
 _CHANNELS = ("position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool", "force", "drive")
 

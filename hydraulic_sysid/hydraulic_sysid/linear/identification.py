@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.decimation import trace
 from hydraulic_sysid.data.records import Record, RecordError
 from hydraulic_sysid.data.resampling import held_average, sampled
@@ -28,8 +28,6 @@ from .models import (
     try_orders,
 )
 from .validation import residual_tests
-
-Array = NDArray[np.float64]
 
 _UNSTABLE = 1.01  # |z|; an estimated integrator may come out a little beyond 1
 

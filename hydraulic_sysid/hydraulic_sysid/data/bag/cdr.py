@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
+from hydraulic_sim.arrays import Index
 from hydraulic_sysid.data.bag.types import typestore
 from hydraulic_sysid.data.errors import RecordError
 
@@ -58,7 +59,7 @@ class Layout:
 
     numbers: Mapping[str, Field]
     texts: Mapping[str, tuple[str, ...]]
-    fixed: NDArray[np.int64]
+    fixed: Index
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Messages:
     texts: Mapping[str, Sequence[tuple[str, ...]]]
 
     @property
-    def stamps(self) -> NDArray[np.int64]:
+    def stamps(self) -> Index:
         """Stamps ``(N,)`` of the headers in nanoseconds."""
         return self.numbers["header.stamp.sec"] * np.int64(10**9) + self.numbers["header.stamp.nanosec"]
 

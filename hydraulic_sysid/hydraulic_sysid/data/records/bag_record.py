@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import PISTON, SERVOVALVE, topic
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.bag import cdr, reader
 from hydraulic_sysid.data.bag.reader import Bag
 from hydraulic_sysid.data.bag.types import string_data
@@ -26,9 +26,6 @@ HELD = {"command": (SERVOVALVE, "effort"), "reference": (PISTON, "position")}
 
 _TOLD_ELSEWHERE = ("experiment", "experiment_end")
 """Texts kept with the bag that only repeat what its messages say."""
-
-Stamps = NDArray[np.int64]
-Array = NDArray[np.float64]
 
 
 def read_bag(path: Path, irregular: str = "error") -> list[Record]:
@@ -64,7 +61,7 @@ def _records(
     path: Path,
     irregular: str,
     span: Span,
-    stamps: Stamps,
+    stamps: Index,
     channels: Mapping[str, Array],
     notes: list[str],
     custom: Mapping[str, str],
@@ -104,8 +101,8 @@ def _plant(bag: Bag) -> dict[str, Any]:
     return {}
 
 
-def _sampled(bag: Bag, notes: list[str]) -> tuple[Stamps, dict[str, Array]]:
-    """Stamps that state and all recorded pressures have, and their channels."""
+def _sampled(bag: Bag, notes: list[str]) -> tuple[Index, dict[str, Array]]:
+    """Index that state and all recorded pressures have, and their channels."""
     state = bag.streams.get(topic("state"))
     if state is None or not state.payloads:
         there = ", ".join(sorted(bag.types)) or "no topics"
@@ -113,7 +110,7 @@ def _sampled(bag: Bag, notes: list[str]) -> tuple[Stamps, dict[str, Array]]:
     messages = _decoded(bag, "state")
     stamps = _increasing(bag, "state", messages)
     piston, valve = (_joint(bag, "state", messages, name) for name in (PISTON, SERVOVALVE))
-    columns: dict[str, tuple[Stamps, Array]] = {
+    columns: dict[str, tuple[Index, Array]] = {
         "drive": (stamps, _values(bag, "state", messages, "effort", valve)),
         "position": (stamps, _values(bag, "state", messages, "position", piston)),
         "velocity": (stamps, _values(bag, "state", messages, "velocity", piston)),
@@ -140,7 +137,7 @@ def _sampled(bag: Bag, notes: list[str]) -> tuple[Stamps, dict[str, Array]]:
     return common, {name: values[np.searchsorted(own, common)] for name, (own, values) in columns.items()}
 
 
-def _hold(bag: Bag, name: str, stamps: Stamps, channels: dict[str, Array]) -> int:
+def _hold(bag: Bag, name: str, stamps: Index, channels: dict[str, Array]) -> int:
     """Latest value at or before every stamp of a topic with stamps of its own; how many stamps have none."""
     stream = bag.streams.get(topic(name))
     if stream is None or not stream.payloads:
@@ -166,7 +163,7 @@ def _note(name: str, early: int) -> str:
     return f"{name}: none before the first {early} samples; {what}"
 
 
-def _measured(path: Path, stamps: Stamps, channels: Mapping[str, Array]) -> dict[str, Array]:
+def _measured(path: Path, stamps: Index, channels: Mapping[str, Array]) -> dict[str, Array]:
     measured = {}
     for name, values in channels.items():
         bad = ~np.isfinite(values)
@@ -187,7 +184,7 @@ def _decoded(bag: Bag, name: str) -> cdr.Messages:
         raise BagError(bag.path, f"{topic(name)}: {error}") from None
 
 
-def _increasing(bag: Bag, name: str, messages: cdr.Messages) -> Stamps:
+def _increasing(bag: Bag, name: str, messages: cdr.Messages) -> Index:
     stamps = messages.stamps
     steps = np.diff(stamps)
     if (steps > 0).all():

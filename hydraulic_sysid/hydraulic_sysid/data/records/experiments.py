@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import FINISHED, STARTED, topic
+from hydraulic_sim.arrays import Index
 from hydraulic_sysid.data.bag.experiment import ENDED
 from hydraulic_sysid.data.bag.reader import Bag
 from hydraulic_sysid.data.bag.types import string_data
@@ -28,7 +28,7 @@ class Span:
     notes: list[str] = field(default_factory=list)
 
 
-def spans(bag: Bag, stamps: NDArray[np.int64]) -> list[Span]:
+def spans(bag: Bag, stamps: Index) -> list[Span]:
     """One span per experiment that starts within the ``stamps`` (N,), or one over all if none does.
 
     An experiment without an end lasts until the next one or the end of the bag. One that ended before its second
@@ -57,7 +57,7 @@ def spans(bag: Bag, stamps: NDArray[np.int64]) -> list[Span]:
     return usable
 
 
-def _span(begin: dict[str, Any], following: Sequence[dict[str, Any]], stamps: NDArray[np.int64]) -> Span:
+def _span(begin: dict[str, Any], following: Sequence[dict[str, Any]], stamps: Index) -> Span:
     """Samples of the experiment that ``begin`` starts, up to its own end or the next start."""
     run = begin.get("started_ns")
     end = next(

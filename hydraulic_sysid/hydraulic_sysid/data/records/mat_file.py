@@ -7,15 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import ColumnMapError, FileError
 from hydraulic_sysid.data.records.channels import TIME
 from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header
 from hydraulic_sysid.data.records.record import Record
 from hydraulic_sysid.data.records.table import records_of_table
-
-Array = NDArray[np.float64]
 
 SUFFIXES = (".mat",)
 

@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import ChannelError, RecordError
 from hydraulic_sysid.data.records.channels import CHANNELS, allowed
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.errors import HydraulicError
-
-Array = NDArray[np.float64]
+from hydraulic_sim.arrays import Array, Index
 
 MAX_DEVIATION = 0.5
 """Of a stamp from the even grid, in periods: beyond it the stamp might belong to another sample."""
@@ -104,7 +102,7 @@ def sampling(time: Array) -> Sampling:
     return Sampling(dt, p99, float(deviation[worst]))
 
 
-def _periods(time: Array) -> tuple[NDArray[np.int64], float]:
+def _periods(time: Array) -> tuple[Index, float]:
     """Whole periods between neighbours, and the period of those that are one apart."""
     steps = np.diff(time)
     median = float(np.median(steps))

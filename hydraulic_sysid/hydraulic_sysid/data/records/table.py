@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import FileError, TimeError
 from hydraulic_sysid.data.records import sampling
 from hydraulic_sysid.data.records.channels import HELD
 from hydraulic_sysid.data.records.column_map import Column, ColumnMap
 from hydraulic_sysid.data.records.record import Record
-
-Array = NDArray[np.float64]
 
 _WORTH_A_NOTE = 0.05  # of a period that stamps are off the even grid
 _MOST_SAMPLES = 20_000_000  # of a resampled record

@@ -11,14 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import PISTON, PLANT_FRAME, SERVOVALVE, find_topic, topic
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.errors import BagError, FileError, RecordError
 from hydraulic_sysid.data.records.channels import CHANNELS, TIME_UNIT
 from hydraulic_sysid.data.records.record import Record
-
-Array = NDArray[np.float64]
 
 _DEPTH = 100  # of the history that a player of the bag offers
 _STATE = ("position", "velocity", "spool", "force", "drive")
@@ -94,7 +92,7 @@ def to_bag(record: Record, folder: Path | str, start_ns: int | None = None) -> P
     return folder
 
 
-def _streams(record: Record, stamps: NDArray[np.int64]) -> Iterator[tuple[str, list[bytes]]]:
+def _streams(record: Record, stamps: Index) -> Iterator[tuple[str, list[bytes]]]:
     """Serialised messages by short topic name, one per stamp."""
     from hydraulic_sysid.data.bag import cdr
 

@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.model_file import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.noise import noise_floor
 from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
-
-Array = NDArray[np.float64]
 
 UNITS = {
     "position": "m",

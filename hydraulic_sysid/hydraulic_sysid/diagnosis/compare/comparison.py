@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import TITLES, number, percent
@@ -27,7 +27,6 @@ from .prediction import TILES, ComparisonError, check
 from .run import MODES, Compared, run
 from .spectra import SEGMENT_SECONDS
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 VARIABLES = {"velocity": "m/s", "drive": "V", "spool": "1", "load_pressure": "Pa", "position": "m", "time": "s"}

@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.model_file import Model
 from hydraulic_sysid.data.decimation import trace
 
 from .run import MODES, Compared
 from .spectra import amplitude_density, noise_density
-
-Array = NDArray[np.float64]
 
 
 def record_document(c: Compared, trace_points: int) -> dict[str, Any]:

@@ -11,11 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.estimation.metrics import autocorrelation
-
-Array = NDArray[np.float64]
 
 BINS = 32
 _SMALLEST_BIN = 20
@@ -29,7 +27,7 @@ class ErrorMap:
     """Statistics ``(B,)`` of an error in bins of one variable, SI; bins with too few samples are left out."""
 
     center: Array
-    count: NDArray[np.int64]
+    count: Index
     mean: Array
     median: Array
     low: Array
@@ -63,7 +61,7 @@ def adaptive_edges(values: Array, bins: int = BINS) -> Array:
     return np.unique(edges)
 
 
-def folds_of(times: list[Array]) -> NDArray[np.int64]:
+def folds_of(times: list[Array]) -> Index:
     """Fold of every sample of the records in a row: the record, or alternate half-seconds of a single one."""
     if len(times) > 1:
         return np.repeat(np.arange(len(times)), [t.size for t in times])
@@ -76,9 +74,9 @@ class Binning:
 
     values: Array
     edges: Array
-    index: NDArray[np.int64]
-    order: NDArray[np.int64]
-    starts: NDArray[np.int64]
+    index: Index
+    order: Index
+    starts: Index
     """``(B + 1,)`` where each bin begins in ``order``."""
 
     @classmethod
@@ -95,7 +93,7 @@ class Binning:
         return cls(values, edges, index, order, starts)
 
 
-def independent_samples(error: Array, folds: NDArray[np.int64]) -> float:
+def independent_samples(error: Array, folds: Index) -> float:
     """How many independent samples an error ``(N,)`` amounts to: of each fold N/(1 + 2·Σρ), ρ until it vanishes.
 
     (Sokal's integrated autocorrelation time.)
@@ -111,7 +109,7 @@ def independent_samples(error: Array, folds: NDArray[np.int64]) -> float:
     return total
 
 
-def error_map(error: Array, binning: Binning, folds: NDArray[np.int64], independent: float | None = None) -> ErrorMap:
+def error_map(error: Array, binning: Binning, folds: Index, independent: float | None = None) -> ErrorMap:
     """Map of an error ``(N,)`` over a variable; samples without an error (NaN) are left out.
 
     ``independent`` is the error's number of independent samples, where it is known already.
@@ -144,7 +142,7 @@ def error_map(error: Array, binning: Binning, folds: NDArray[np.int64], independ
     )
 
 
-def cross_validated_share(error: Array, index: NDArray[np.int64], folds: NDArray[np.int64], bins: int) -> float:
+def cross_validated_share(error: Array, index: Index, folds: Index, bins: int) -> float:
     """1 − Σ(e − ē_bin)²/Σ(e − ē)², with the means ē_bin and ē from the other folds.
 
     A bin that the other folds do not hold predicts their overall mean. NaN with fewer than two folds.

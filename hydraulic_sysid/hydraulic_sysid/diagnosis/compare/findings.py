@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.display import TITLES, first_upper, number, quantity
 
 from .errormaps import ErrorMap
 from .spectra import power_shares
-
-Array = NDArray[np.float64]
 
 AT_FLOOR = 1.5
 """Errors up to this multiple of what an exact model would show are called explained."""

@@ -17,18 +17,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from hydraulic_interfaces.errors import HydraulicError
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant, PlantState
 from hydraulic_sysid.data.records import Record
 
 from .channels import Measured, load_pressure
-
-Array = NDArray[np.float64]
 
 TILES = 10
 """Starts per horizon."""
@@ -136,7 +134,7 @@ def _start_values(data: Measured, smoothed: bool) -> dict[str, Array]:
     return {**values, "velocity": data.channels["velocity"]}
 
 
-def _states(plant: Plant, values: dict[str, Array], inner: Array, starts: NDArray[np.int64]) -> Array:
+def _states(plant: Plant, values: dict[str, Array], inner: Array, starts: Index) -> Array:
     """Initial states ``(S, n_states)``: measured where there is a measurement, of the free run elsewhere."""
     states = inner[starts]
     for name, measurement in values.items():
@@ -144,7 +142,7 @@ def _states(plant: Plant, values: dict[str, Array], inner: Array, starts: NDArra
     return states
 
 
-def _tile(values: Array, starts: NDArray[np.int64], ahead: int, stride: int, count: int) -> Array:
+def _tile(values: Array, starts: Index, ahead: int, stride: int, count: int) -> Array:
     """The last ``stride`` samples of every run, side by side: ``(count,)``, NaN before the first."""
     tiled = np.full(count, np.nan)
     index = starts[:, None] + np.arange(ahead - stride + 1, ahead + 1)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 
 from .channels import Measured, measured
 from .prediction import Predictions, inner_states, predict
-
-Array = NDArray[np.float64]
 
 MODES = ("free_run", "horizon", "one_step")
 

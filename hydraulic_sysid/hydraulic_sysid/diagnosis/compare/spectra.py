@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import freqz, welch
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
-
-Array = NDArray[np.float64]
 
 SEGMENT_SECONDS = 5.0
 BANDS_PER_DECADE = 30

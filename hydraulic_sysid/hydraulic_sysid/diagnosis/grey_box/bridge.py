@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.decimation import trace
@@ -33,7 +33,6 @@ from .features import Scales, Terms, terms
 from .selection import FOLDS, Selected, select
 from .verdict import shares, verdict
 
-Array = NDArray[np.float64]
 TARGETS = ("velocity", "load_pressure")
 """Channels whose error is modelled, as far as the records have them. The position's error is the velocity's, summed."""
 STEP_S = 0.01
@@ -186,7 +185,7 @@ def _contributions(
     return sorted(rows, key=lambda row: -float(row["share"]))
 
 
-def _blocks(parts: Sequence[_Part]) -> NDArray[np.int64]:
+def _blocks(parts: Sequence[_Part]) -> Index:
     """Number of the half-second block of every sample, records in a row."""
     numbers, first = [], 0
     for part in parts:

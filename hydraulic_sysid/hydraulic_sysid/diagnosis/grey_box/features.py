@@ -11,11 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array, Mask
 from hydraulic_sysid.data.display import TITLES
 
-Array = NDArray[np.float64]
 LAGS = (0.0, 0.01, 0.02, 0.04, 0.08, 0.16)
 """Delays of the drive in seconds."""
 BENDS = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -45,7 +44,7 @@ class Terms:
 
     names: list[str]
     values: Array
-    linear: NDArray[np.bool_]
+    linear: Mask
 
 
 def terms(signals: Mapping[str, Array], dt: float, scales: Scales) -> Terms:

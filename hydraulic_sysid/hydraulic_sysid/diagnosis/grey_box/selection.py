@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hydraulic_sim.arrays import Array, Index, Mask
+
 FOLDS = 5
 MOST = 12
 _DEPENDENT = 1e-8
@@ -36,7 +36,7 @@ class Selected:
         return values[:, self.order] @ self.coefficients
 
 
-def select(values: Array, target: Array, blocks: NDArray[np.int64], most: int = MOST) -> Selected:
+def select(values: Array, target: Array, blocks: Index, most: int = MOST) -> Selected:
     """Terms for a target ``(N,)`` out of candidates ``(N, k)``; ``blocks`` (N,) numbers the consecutive blocks."""
     folds = blocks % FOLDS
     errors = []
@@ -74,9 +74,7 @@ def _forward(values: Array, target: Array, most: int) -> list[int]:
     return order
 
 
-def _path(
-    values: Array, target: Array, order: list[int], rest: NDArray[np.bool_], out: NDArray[np.bool_], most: int
-) -> list[float]:
+def _path(values: Array, target: Array, order: list[int], rest: Mask, out: Mask, most: int) -> list[float]:
     """Mean squared error on what was left out, of 0, 1, … ``most`` terms fitted to the rest."""
     errors = [float(np.mean(target[out] ** 2))]
     for count in range(1, most + 1):

@@ -14,15 +14,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation.jit import jit
 from hydraulic_sysid.linear.models import IdentificationError, TransferFunctionOrder, fit_transfer_function
 from hydraulic_sysid.linear.models.order_selection import information_criteria
 from hydraulic_sysid.linear.models.series import experiments, lengths_agree
 
-Array = NDArray[np.float64]
 KNOTS = (3, 5, 7, 9, 11)
 _SUBSTEPS = 4
 _FAR = 1e3  # residual, in standard deviations of the output, of a run that has left all bounds

@@ -16,17 +16,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.errors import HydraulicError
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.slots import SLOTS
 from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
 
 from .sensors import SensorErrors
-
-Array = NDArray[np.float64]
 
 RESTART = 5  # samples that the model runs from each measured state
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
+from hydraulic_sim.arrays import Array
 
 _REACH = 0.995  # quantile of the size at which the outermost knot of a signed variable lies
 

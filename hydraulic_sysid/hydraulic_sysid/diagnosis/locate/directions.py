@@ -13,15 +13,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.effect import arguments
 
 from .curves import lagged, play, rate_limited, shifted, tents
 from .knots import Knots
 from .signals import Signals
-
-Array = NDArray[np.float64]
 
 LAGS = (1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 32e-3, 64e-3)
 """Seconds ago that a valve may follow what it was told."""

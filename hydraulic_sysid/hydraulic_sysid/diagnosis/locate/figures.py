@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.diagnosis.compare import errormaps
 from hydraulic_sysid.diagnosis.compare.findings import WORTH_SAYING
 from hydraulic_sysid.diagnosis.compare.spectra import band_average
@@ -18,8 +18,6 @@ from .balances import UNITS
 from .blame import Verdict
 from .noise_model import thin
 from .study import Study
-
-Array = NDArray[np.float64]
 
 TITLES = {
     "force": "force balance",

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from hydraulic_sim.arrays import Array
 
 from .curves import even_knots, signed_knots
 from .signals import Signals
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

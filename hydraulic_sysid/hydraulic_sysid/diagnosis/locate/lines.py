@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-Array = NDArray[np.float64]
+from hydraulic_sim.arrays import Array
 
 _MOST = 3  # lines
 _HEIGHT = 12.0  # of the median over records, above the spectrum around: noise reaches 5 in 10⁴ frequencies

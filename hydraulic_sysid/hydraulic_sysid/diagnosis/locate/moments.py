@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from hydraulic_sim.arrays import Array, Index
 
 FOLDS = 4
 BLOCK_SECONDS = 0.5

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hydraulic_sim.arrays import Array
 
 RATE = 200.0  # per second, of what is kept
 ORDER = 10  # of the autoregression: 50 ms, beyond the memory of a second difference at 200 per second

@@ -11,12 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.plant import Plant
-
-Array = NDArray[np.float64]
 
 PIECE = 0.25  # s
 _SPAN = 0.025  # s, of the quadratic through which initial pressures are read

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
 
 from .balances import Residuals, root
 from .path import Path
-
-Array = NDArray[np.float64]
 
 _CUBIC = 3
 _MOVING = 3.0  # standard deviations of the velocity's noise at which a piston surely moves

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.compare.channels import Measured, measured
 from hydraulic_sysid.diagnosis.compare.prediction import start
@@ -23,8 +23,6 @@ from .noise_model import Whitener, thin, thinning
 from .path import path_of
 from .sensors import SensorErrors, sensor_errors
 from .signals import Signals, signals_of, smoothed, smoothing_windows
-
-Array = NDArray[np.float64]
 
 _SENSED = ("position", "pressure_a", "pressure_b", "pressure_supply", "spool")
 _EDGE = 0.1  # s at either end of a record, where smoothing filters have one side only

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.settings import Settings, declared_fields, number
 
-Array = NDArray[np.float64]
 S = TypeVar("S", bound="Signal")
 
 

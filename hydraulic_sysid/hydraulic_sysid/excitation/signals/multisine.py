@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.settings import choice, integer, numbers
-from hydraulic_sysid.excitation.signals._base import Array, Signal
+from hydraulic_sysid.excitation.signals._base import Signal
 
 
 @dataclass(frozen=True)

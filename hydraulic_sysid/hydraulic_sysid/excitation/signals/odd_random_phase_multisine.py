@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.excitation.settings import integer, number
-from hydraulic_sysid.excitation.signals._base import Array, Signal
+from hydraulic_sysid.excitation.signals._base import Signal
 from hydraulic_sysid.excitation.signals.multisine import random_phases, sum_of_tones
-
-Harmonics = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class OddRandomPhaseMultisine(Signal):
             allowed = f"a band that holds {self.group} odd multiples of 1/period = {1 / self.period:g} Hz at least"
             raise self.error("frequency_max", self.frequency_max, allowed)
 
-    def _odd(self) -> Harmonics:
+    def _odd(self) -> Index:
         """The odd harmonics of the band."""
         slack = 1e-9  # a band that ends on a line includes it
         first = math.ceil(self.frequency_min * self.period - slack)
@@ -53,14 +51,14 @@ class OddRandomPhaseMultisine(Signal):
         found = np.arange(first, last + 1)
         return found[found % 2 == 1]
 
-    def left_out(self) -> Harmonics:
+    def left_out(self) -> Index:
         """The odd harmonics that are left out, one of each whole group, (G,)."""
         odd = self._odd()
         groups = odd.size // self.group
         picks = np.random.Generator(np.random.PCG64(self.lines_seed)).integers(0, self.group, groups)
         return odd[np.arange(groups) * self.group + picks]
 
-    def excited(self) -> Harmonics:
+    def excited(self) -> Index:
         """The harmonics that are played, (K,)."""
         odd = self._odd()
         return np.setdiff1d(odd, self.left_out()) if odd.size >= self.group else odd[:0]

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.errors import PlaybackError
 from hydraulic_sysid.excitation.settings import number, path, text
-from hydraulic_sysid.excitation.signals._base import Array, Signal
+from hydraulic_sysid.excitation.signals._base import Signal
 
 TIME_COLUMN = "time_s"
 DRIVE_COLUMNS = ("drive_V", "command_V")

@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.settings import choice, integer, number
-from hydraulic_sysid.excitation.signals._base import Array, Signal, amplitude
+from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
 @dataclass(frozen=True)

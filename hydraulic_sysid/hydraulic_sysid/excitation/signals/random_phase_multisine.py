@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.crest import low_crest_phases
 from hydraulic_sysid.excitation.settings import choice, integer, number
-from hydraulic_sysid.excitation.signals._base import Array, Signal
+from hydraulic_sysid.excitation.signals._base import Signal
 from hydraulic_sysid.excitation.signals.multisine import random_phases, sum_of_tones
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.settings import number
-from hydraulic_sysid.excitation.signals._base import Array, Signal, amplitude
+from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from hydraulic_sim.arrays import Array, Complex, Index
 
 from .errors import FrequencyResponseError
 from .periodic import Periods
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -135,12 +133,12 @@ class _Spectra:
             cov=np.sum((Y - y) * np.conj(U - u), axis=0) / freedom,
         )
 
-    def residual_deviation(self, lines: NDArray[np.int64], response: Complex) -> Array:
+    def residual_deviation(self, lines: Index, response: Complex) -> Array:
         """Standard deviation of Y − G·U at the lines: what changes between periods and the drive does not explain."""
         explained = 2.0 * np.real(np.conj(response) * self.cov[lines]) - np.abs(response) ** 2 * self.var_u[lines]
         return np.sqrt(np.maximum(self.var_y[lines] - explained, 0.0))
 
-    def response_variance(self, k: NDArray[np.int64]) -> Array:
+    def response_variance(self, k: Index) -> Array:
         """Of Y/U at the lines, with what both have in common, [1] eq. (2-24)."""
         U, Y = self.U[k], self.Y[k]
         gain = np.abs(Y / U) ** 2
@@ -150,7 +148,7 @@ class _Spectra:
 
 
 def _detection_lines(
-    spectra: Sequence[_Spectra], frequency: Array, response: Complex, k: NDArray[np.int64], spacing: float
+    spectra: Sequence[_Spectra], frequency: Array, response: Complex, k: Index, spacing: float
 ) -> tuple[Lines | None, Lines | None]:
     """Odd and even lines within the band that were not played; None where none was left out."""
     inside = np.setdiff1d(np.arange(k.min(), k.max() + 1), k)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array, Complex
 from hydraulic_sysid.data.display import number
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
@@ -17,8 +17,6 @@ from .bla import BestLinearApproximation, Lines, best_linear_approximation
 from .errors import FrequencyResponseError
 from .periodic import Periods, periodic_signal, periods_of
 from .spectral import Spectral, etfe, welch
-
-Array = NDArray[np.float64]
 
 METHODS = ("auto", "bla", "welch")
 _SEGMENTS = 8.0
@@ -120,7 +118,7 @@ def _lines(lines: Lines | None) -> dict[str, Any] | None:
     return {"frequency": lines.frequency, "amplitude": lines.amplitude, "noise_std": lines.noise}
 
 
-def _curve(response: NDArray[np.complex128]) -> dict[str, Any]:
+def _curve(response: Complex) -> dict[str, Any]:
     return {"magnitude": np.abs(response), "phase": np.unwrap(np.angle(response))}
 
 

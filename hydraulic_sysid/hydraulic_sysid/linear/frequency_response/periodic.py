@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import ExcitationError, Plan
 
 from .errors import FrequencyResponseError
-
-Array = NDArray[np.float64]
 
 _PART = 0.02  # of a period, over which drift from one period to the next is averaged
 _PLAYED = 0.05  # of the strongest line: what is stronger was played, where no plan tells
@@ -29,7 +27,7 @@ class Periods:
     drive: Array
     output: Array
     dt: float
-    harmonics: NDArray[np.int64]
+    harmonics: Index
 
     @property
     def spacing(self) -> float:
@@ -37,7 +35,7 @@ class Periods:
         return 1.0 / (self.drive.shape[1] * self.dt)
 
 
-def periodic_signal(record: Record) -> tuple[Plan, float, NDArray[np.int64]] | None:
+def periodic_signal(record: Record) -> tuple[Plan, float, Index] | None:
     """Plan, period [s] and harmonics played of a record whose excitation is a multisine over all its time; or None."""
     plan = _plan(record.description)
     lines, period = getattr(plan and plan.signal, "lines", None), getattr(plan and plan.signal, "period", None)
@@ -103,7 +101,7 @@ def _without_drift(output: Array, begin: int, count: int, size: int, margin: int
     return whole - drift[:, None] * (np.arange(size) / size)
 
 
-def _played(drives: Array) -> NDArray[np.int64]:
+def _played(drives: Array) -> Index:
     spectrum = np.abs(np.fft.rfft(drives.mean(axis=0)))
     spectrum[0] = 0.0
     return np.flatnonzero(spectrum > _PLAYED * spectrum.max()).astype(np.int64)

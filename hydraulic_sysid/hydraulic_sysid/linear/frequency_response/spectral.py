@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import signal
 
-from .errors import FrequencyResponseError
+from hydraulic_sim.arrays import Array, Complex, Mask
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from .errors import FrequencyResponseError
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Spectral:
         return np.abs(self.response) * np.sqrt(np.maximum(1.0 - self.coherence, 0.0) / (safe * self.averages))
 
     @property
-    def played(self) -> NDArray[np.bool_]:
+    def played(self) -> Mask:
         """Which lines (K,) the drive reaches with at least 10⁻⁵ of the power of the strongest; of others the coherence
         is that of leakage."""
         return self.drive >= 1e-5

@@ -13,15 +13,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import lfilter
+
+from hydraulic_sim.arrays import Array
 
 from .errors import IdentificationError
 from .poles import Pole, sampled_poles
 from .series import experiments, lengths_agree
 from .tall import solve
 
-Array = NDArray[np.float64]
 _OVERFLOW = 1e8
 
 

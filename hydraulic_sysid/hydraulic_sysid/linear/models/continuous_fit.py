@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from hydraulic_sim.arrays import Array
 
 from .errors import IdentificationError
 from .noise_model import fit_noise
@@ -14,7 +16,6 @@ from .separable import Point, Problem, refine
 from .series import experiments
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
 
-Array = NDArray[np.float64]
 METHODS = ("output error", "srivc")
 _CUTOFFS = (0.3, 1.0, 3.0, 10.0, 30.0)
 

@@ -12,12 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from .recursion import propagate
+from hydraulic_sim.arrays import Array
 
-Array = NDArray[np.float64]
+from .recursion import propagate
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import lfilter
+
+from hydraulic_sim.arrays import Array
 
 from .arx import ArxModel, ArxOrder, fit_arx, regressors
 from .errors import IdentificationError
 from .noise_model import autoregression
 from .series import experiments
-
-Array = NDArray[np.float64]
 
 
 def fit_arx_instruments(

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from hydraulic_sim.arrays import Array
 
 from .poles import Pole
-
-Array = NDArray[np.float64]
 
 
 class LinearModel(Protocol):

@@ -17,15 +17,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation import metrics
 
 from .errors import IdentificationError
 from .model import LinearModel
 from .structures import Structure, fit_on_equal_samples
 
-Array = NDArray[np.float64]
 CRITERIA = ("fpe", "aic", "bic", "cv")
 _PARTS = 4
 

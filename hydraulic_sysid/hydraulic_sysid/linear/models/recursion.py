@@ -7,11 +7,9 @@ against the plant's time constants, as all poles then crowd at z = 1; the recurs
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation.jit import jit
-
-Array = NDArray[np.float64]
 
 
 @jit

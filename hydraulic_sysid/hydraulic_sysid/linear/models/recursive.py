@@ -18,13 +18,13 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from hydraulic_sim.arrays import Array
 
 from .arx import ArxModel, ArxOrder
 from .errors import IdentificationError
 from .poles import Pole, sampled_poles
 
-Array = NDArray[np.float64]
 _STILL = 6.0  # an output that spans less, in standard deviations of the error, stands still
 _UNCERTAIN = 1e6  # prior variance of every coefficient, in the units of the scaled regressor
 

@@ -12,13 +12,12 @@ good start, which that fit does: here it provides it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
+
+from hydraulic_sim.arrays import Array
 
 from .derivatives import Filter
 from .separable import Point, Problem, evaluate
-
-Array = NDArray[np.float64]
 
 
 def refined_iv(problem: Problem, cutoff: float, iterations: int = 20, tolerance: float = 1e-4) -> Point | None:

@@ -15,13 +15,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
+
+from hydraulic_sim.arrays import Array
 
 from .derivatives import Derivatives, Filter
 from .errors import IdentificationError
 
-Array = NDArray[np.float64]
 _GROWTH = 3.0  # an unstable mode may grow by e³ over a record: an integrator's estimate, no more
 
 

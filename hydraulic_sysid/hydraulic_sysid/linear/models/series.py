@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from hydraulic_sim.arrays import Array
 
 from .errors import IdentificationError
 
-Array = NDArray[np.float64]
 OFFSETS = ("estimate", "remove", "none")
 
 

@@ -11,14 +11,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import ss2tf
+
+from hydraulic_sim.arrays import Array
 
 from .poles import Pole, poles_at
 from .recursion import propagate
 from .series import lengths_agree
 
-Array = NDArray[np.float64]
 _OVERFLOW = 1e8
 
 

@@ -18,8 +18,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve_discrete_are
+
+from hydraulic_sim.arrays import Array
 
 from .errors import IdentificationError
 from .recursion import propagate
@@ -27,7 +29,6 @@ from .series import experiments
 from .state_space import StateSpaceModel, free_modes
 from .tall import triangle
 
-Array = NDArray[np.float64]
 Pairs = Sequence[tuple[Array, Array]]
 _HORIZON = 15
 _RELATIVE = 1e-12

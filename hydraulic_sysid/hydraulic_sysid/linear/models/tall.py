@@ -13,11 +13,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from hydraulic_sim.arrays import Array
 
 from .errors import IdentificationError
 
-Array = NDArray[np.float64]
 _BLOCK = 1024
 _CHUNK = 64 * _BLOCK
 _WORST = 1e12

@@ -14,15 +14,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import lfilter
+
+from hydraulic_sim.arrays import Array
 
 from .derivatives import Filter
 from .errors import IdentificationError
 from .poles import Pole, continuous_poles
 from .series import lengths_agree
 
-Array = NDArray[np.float64]
 _OVERFLOW = 1e8
 
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation import metrics
 
-Array = NDArray[np.float64]
 LEVEL = 0.99
 LAGS = 25
 SHORTEST = 100

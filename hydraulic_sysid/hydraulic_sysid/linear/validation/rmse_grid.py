@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
@@ -22,8 +22,6 @@ from hydraulic_sysid.data.resampling import held_average, sampled
 from hydraulic_sysid.estimation import metrics
 from hydraulic_sysid.linear.models.errors import IdentificationError
 from hydraulic_sysid.linear.models.model import LinearModel
-
-Array = NDArray[np.float64]
 
 SHAPES: dict[str, Callable[[Array], Array]] = {
     "triangle": lambda phase: signal.sawtooth(phase + 0.5 * np.pi, 0.5),
