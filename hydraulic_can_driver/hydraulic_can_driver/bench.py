@@ -9,23 +9,27 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from hydraulic_can_driver.bus import Bus, Node
 from hydraulic_can_driver.cia408 import CONTROL_WORDS, State, StateMachine, describe, state_of
 from hydraulic_can_driver.codec import PdoCodec
 from hydraulic_can_driver.errors import BusDownError, DeviceError
-from hydraulic_can_driver.faults import NEEDS_CONFIGURE, Fault, FaultLatch
+from hydraulic_can_driver.faults import NEEDS_CONFIGURE, BusFault, FaultLatch
 from hydraulic_can_driver.frames import Frames
 from hydraulic_can_driver.master import PRE_OPERATIONAL, START, Master
 from hydraulic_can_driver.measuring import Measuring
 from hydraulic_can_driver.receiver import HEARTBEAT, OPERATIONAL, Receiver
 from hydraulic_can_driver.supervision import Supervision
-from hydraulic_can_driver.sync import Beat, KernelBeat, LoopBeat
+from hydraulic_can_driver.sync import Beat, KernelBeat, LockstepBeat, LoopBeat
 from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_interfaces.samples import PlantSample
 
 KERNEL_SYNC = ("socketcan",)
 """Interfaces whose kernel sends messages periodically by itself."""
+
+PROGRAMS_ONLY = ("virtual", "udp_multicast")
+"""Interfaces on which there are no devices but virtual ones: only those can wait."""
 
 _QUIET = (State.INIT, State.DISABLED, State.FAULT_DISABLED, State.NOT_READY)
 """States in which the spool does not follow the setpoint; the last two only after a fault."""
@@ -33,26 +37,37 @@ _QUIET = (State.INIT, State.DISABLED, State.FAULT_DISABLED, State.NOT_READY)
 _STOPPING_S = 0.4
 """Patience with a valve that is to be disabled: whoever stops the bench does not wait much longer."""
 
+_LOCKSTEP_S = 5.0
+"""Patience (wall time) with devices in lockstep, whose own clock stands still meanwhile."""
+
 
 class Bench:
     """The devices of `bus` on an open interface.
 
-    :raises BusDownError: the interface cannot be opened.
+    In `lockstep` each SYNC waits for all answers to the one before, time is counted in SYNCs, and devices that do not
+    answer are a fault at once.
+
+    :raises BusDownError: the interface cannot be opened, or is not one for lockstep.
     """
 
-    def __init__(self, bus: Bus, interface: str = "", channel: str = "") -> None:
+    def __init__(self, bus: Bus, interface: str = "", channel: str = "", lockstep: bool = False) -> None:
         interface = interface or bus.interface
         kernel = interface in KERNEL_SYNC
+        if lockstep and interface not in PROGRAMS_ONLY:
+            raise BusDownError(f"lockstep on {interface}: only virtual devices wait, on {' or '.join(PROGRAMS_ONLY)}")
+        if lockstep:
+            bus = replace(bus, monitoring=replace(bus.monitoring, missed_cycles=1))
         self.bus = bus
         self.faults = FaultLatch()
         self.frames = Frames(bus, self.faults)
-        self.receiver = Receiver(bus, self.frames, self.faults, interface, kernel)
+        self._period = 1.0 / bus.rate
+        self._lockstep = lockstep
+        self.receiver = Receiver(bus, self.frames, self.faults, interface, kernel, self.now)
         self.supervision = Supervision(bus, self.receiver, self.frames, self.faults)
         self.machine = StateMachine(bus.monitoring.state_change)
         self.measuring = Measuring(bus)
         self.readings: dict[str, dict[str, float]] = {}
         self.operational = False
-        self._period = 1.0 / bus.rate
         self._codec = PdoCodec(bus.drive_pdo)
         self._status_pdo, self._status = next(
             (pdo, signal.address) for _, pdo, signal in bus.signals() if signal.name == "status_word"
@@ -63,8 +78,12 @@ class Bench:
         self._next_heartbeat = 0.0
         self._left_by = 0.0  # until then the valve may take to get ready; inf: its fault has been reset
         self.master = Master(bus, self.receiver, interface, channel)
-        beat = KernelBeat if kernel else LoopBeat
+        beat = LockstepBeat if lockstep else KernelBeat if kernel else LoopBeat
         self.beat: Beat = beat(self.master, self.frames, round(1e9 * self._period))
+
+    def now(self) -> float:
+        """Time [s] in which faults are judged: that of the SYNCs in lockstep, else the monotonic clock's."""
+        return self.frames.cycle * self._period if self._lockstep else time.monotonic()
 
     def boot(self) -> None:
         """Check who is there, set the valve to 0 and off, boot and map all devices, read back what they are set to.
@@ -100,14 +119,14 @@ class Bench:
         self.measuring.forget()
         self.frames.forget()
         self._looping, self.operational = False, True
-        self._left_by = time.monotonic() + self.bus.monitoring.state_change
+        self._left_by = self.now() + self.bus.monitoring.state_change
         self.beat.start()
         for node in self.bus.nodes.values():
             self.master.command(node, START)
         self._cycles_until(self._ready, 3.0 * self.bus.monitoring.state_change)
         if not self._ready():
             raise DeviceError(f"the bench is not ready: {self._reason()}")
-        self.supervision.begin(time.monotonic())
+        self.supervision.begin(self.now())
         self.receiver.watching = self.faults.armed = True
 
     def follow(self, goal: State) -> None:
@@ -118,7 +137,7 @@ class Bench:
         with self._changed:
             if self.problem and goal is not State.DISABLED:
                 raise DeviceError(self.problem)
-            self.machine.ask(goal, time.monotonic())
+            self.machine.ask(goal, self.now())
             if self._looping and not self._wait(lambda: self.machine.arrived or bool(self.machine.problem)):
                 raise DeviceError(f"{self._reason()}; expected {goal.name}")
             if self.machine.problem and goal is not State.DISABLED:
@@ -127,14 +146,14 @@ class Bench:
     def cycle(self, stamp_ns: int, drive: float) -> PlantSample | None:
         """One SYNC of the running loop: send the drive [V], give the sample; None if not all frames came in time."""
         self._looping = True
-        self.supervision.check(time.monotonic())
+        self.supervision.check(self.now())
         complete, frame = self._exchange(drive, stamp_ns)
         self.supervision.cycle(stamp_ns, complete)
         with self._changed:
             self._hear_valve()
             sample = self._take(stamp_ns, frame) if complete else None
             if self.machine.problem and not self.faults.text:
-                self.faults.report(Fault.VALVE, self.machine.problem)
+                self.faults.report(BusFault.VALVE, self.machine.problem)
             self._changed.notify_all()
         return sample
 
@@ -147,7 +166,7 @@ class Bench:
             return
         if any(fault in self.faults for fault in NEEDS_CONFIGURE):
             raise DeviceError(f"{self.faults.text}: deactivate, clean up and configure anew")
-        if silent := self.supervision.silent(time.monotonic()):
+        if silent := self.supervision.silent(self.now()):
             raise DeviceError(f"no heartbeat: {', '.join(silent)}")
         if late := self.frames.debtors():
             raise DeviceError(f"frames come late: {', '.join(late)}; deactivate and activate where that stays so")
@@ -155,8 +174,8 @@ class Bench:
         with self._changed:
             self.faults.clear()
             self.measuring.forget()
-            self.supervision.begin(time.monotonic())
-            self.machine.reset(time.monotonic())
+            self.supervision.begin(self.now())
+            self.machine.reset(self.now())
             if not self._wait(lambda: self.machine.arrived or bool(self.faults.text)) or self.faults.text:
                 raise DeviceError(self.faults.text or self._reason())
         self._no_errors([self.bus.valve])
@@ -206,16 +225,17 @@ class Bench:
             setpoint = self.measuring.allowed(drive) if self.machine.active else 0.0
             frame, _ = self._codec.encode({"control_word": self.machine.control, "drive": setpoint})
         try:
-            now = time.monotonic()
+            now = self.now()
             if self._looping and now >= self._next_heartbeat:
                 self._next_heartbeat = now + self.bus.master.heartbeat
                 self.master.send(HEARTBEAT + self.bus.master.id, bytes([OPERATIONAL]))
             in_time = self.beat.exchange(self.bus.drive_pdo.cob_id, frame, sync_ns)
         except BusDownError as error:
-            self.faults.report(Fault.BUS, str(error))
+            self.faults.report(BusFault.BUS, str(error))
             in_time = False
         cycle = self.frames.cycle
-        complete = self.frames.wait(time.monotonic() + self.bus.monitoring.frames_within * self._period)
+        patience = _LOCKSTEP_S if self._lockstep else self.bus.monitoring.frames_within * self._period
+        complete = self.frames.wait(time.monotonic() + patience)
         # Where the kernel's next SYNC has come meanwhile, the frames are answers to that.
         complete &= self.frames.cycle == cycle
         self.frames.end()
@@ -224,7 +244,7 @@ class Bench:
     def _hear_valve(self) -> None:
         """The valve's word counts also where another device is silent."""
         if self.frames.has(self._status_pdo.cob_id):
-            self.machine.advance(int(self.frames.quantities()["status_word"]), time.monotonic())
+            self.machine.advance(int(self.frames.quantities()["status_word"]), self.now())
 
     def _take(self, stamp_ns: int, frame: bytes) -> PlantSample:
         found = self.frames.quantities()
@@ -235,7 +255,7 @@ class Bench:
     def _cycles_until(self, done: Callable[[], bool], patience: float) -> None:
         """Cycles of its own at 0 V, before the loop begins and after it has ended."""
         end = due = time.monotonic()
-        end += patience
+        end += max(patience, _LOCKSTEP_S) if self._lockstep else patience
         while not done() and due < end:
             complete, frame = self._exchange(0.0, self.beat.next_sync())
             with self._changed:
@@ -247,7 +267,7 @@ class Bench:
 
     def _ready(self) -> bool:
         if self.machine.arrived and self.machine.goal is State.INIT:
-            self.machine.ask(State.DISABLED, time.monotonic())
+            self.machine.ask(State.DISABLED, self.now())
         self._reset_what_was_left()
         states = self.receiver.states
         operational = all(states.get(node.name) == OPERATIONAL for node in self.bus.nodes.values() if node.heartbeat)
@@ -256,10 +276,10 @@ class Bench:
 
     def _reset_what_was_left(self) -> None:
         """NOT_READY is as well what a fault in INIT looks like."""
-        now, state = time.monotonic(), self.machine.state
+        now, state = self.now(), self.machine.state
         if self._left_by < float("inf") and (state.faulty or state is State.NOT_READY and now > self._left_by):
             self._left_by = float("inf")
-            self.faults.report(Fault.VALVE, f"reset at the start: {describe(self.machine.status or 0)}")
+            self.faults.report(BusFault.VALVE, f"reset at the start: {describe(self.machine.status or 0)}")
             self.machine.reset(now)
 
     def _reason(self) -> str:
@@ -274,7 +294,8 @@ class Bench:
         return f"the valve is {describe(self.machine.status or 0)}"
 
     def _wait(self, done: Callable[[], bool]) -> bool:
-        return self._changed.wait_for(done, 4.0 * self.bus.monitoring.state_change + 1.0)
+        patience = 4.0 * self.bus.monitoring.state_change + 1.0
+        return self._changed.wait_for(done, max(patience, _LOCKSTEP_S) if self._lockstep else patience)
 
     def _sensors(self) -> list[Node]:
         """All but the valve, which tells its faults in the status word and is reset by the control word."""
@@ -301,4 +322,4 @@ class Bench:
                 self.master.watch_master(self.bus.valve, False)
                 self._valve_state = state_of(int(self.master.read(self.bus.valve, self._status)))
             except HydraulicError as error:
-                self.faults.report(Fault.BUS, str(error))
+                self.faults.report(BusFault.BUS, str(error))

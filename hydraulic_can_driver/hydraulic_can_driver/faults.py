@@ -11,7 +11,7 @@ from collections import Counter, deque
 from enum import Enum
 
 
-class Fault(Enum):
+class BusFault(Enum):
     """Name in the diagnostics, and what it stands for."""
 
     BUS = "bus-off, interface down, or a frame that could not be sent"
@@ -27,7 +27,7 @@ class Fault(Enum):
     SECOND_MASTER = "somebody else on the bus sends what only the driver may send"
 
 
-NEEDS_CONFIGURE = (Fault.RESTART, Fault.LENGTH)
+NEEDS_CONFIGURE = (BusFault.RESTART, BusFault.LENGTH)
 """Faults after which the devices have to be configured anew; no reset releases them."""
 
 
@@ -36,12 +36,12 @@ class FaultLatch:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._latched: dict[Fault, str] = {}
-        self.counts: Counter[Fault] = Counter()
+        self._latched: dict[BusFault, str] = {}
+        self.counts: Counter[BusFault] = Counter()
         self.log: deque[str] = deque(maxlen=20)
         self.armed = False
 
-    def report(self, fault: Fault, text: str) -> None:
+    def report(self, fault: BusFault, text: str) -> None:
         """Note that something is wrong; of each kind the first text is kept."""
         with self._lock:
             self.counts[fault] += 1
@@ -59,12 +59,12 @@ class FaultLatch:
             return "; ".join(self._latched.values())
 
     @property
-    def latched(self) -> set[Fault]:
+    def latched(self) -> set[BusFault]:
         """All kinds that are latched."""
         with self._lock:
             return set(self._latched)
 
-    def __contains__(self, fault: Fault) -> bool:
+    def __contains__(self, fault: BusFault) -> bool:
         return fault in self._latched
 
     def clear(self) -> None:

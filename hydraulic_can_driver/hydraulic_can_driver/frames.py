@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from hydraulic_can_driver.bus import Bus, Node
 from hydraulic_can_driver.codec import PdoCodec
 from hydraulic_can_driver.errors import CodecError
-from hydraulic_can_driver.faults import Fault, FaultLatch
+from hydraulic_can_driver.faults import BusFault, FaultLatch
 
 _LOST = 2  # so many frames in a row may be lost for good
 
@@ -86,7 +86,7 @@ class Frames:
             try:
                 codec.unpack(data)
             except CodecError as error:
-                self._faults.report(Fault.LENGTH, f"{self._nodes[cob_id].name}: {error}")
+                self._faults.report(BusFault.LENGTH, f"{self._nodes[cob_id].name}: {error}")
             return
         with self._changed:
             # A second one within a cycle means that the first belonged to the cycle before.

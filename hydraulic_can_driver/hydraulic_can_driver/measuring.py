@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from hydraulic_can_driver.bus import SWITCHES, Bus
-from hydraulic_can_driver.faults import Fault
+from hydraulic_can_driver.faults import BusFault
 from hydraulic_can_driver.plausibility import PositionCheck
 from hydraulic_interfaces.samples import NAN, PlantSample
 
@@ -33,7 +33,7 @@ class Measuring:
         high = 0.0 if SWITCHES[1] in self.closed else limit
         return min(max(drive, low), high)
 
-    def problems(self, stamp_ns: int, found: Mapping[str, float]) -> Iterator[tuple[Fault, str]]:
+    def problems(self, stamp_ns: int, found: Mapping[str, float]) -> Iterator[tuple[BusFault, str]]:
         """What the sensors of this cycle show to be wrong."""
         if self._switch is not None:
             word = int(found["switches"])
@@ -41,10 +41,10 @@ class Measuring:
         for name, value in found.items():
             if name.endswith("_status") and value:
                 what = name.removesuffix("_status")
-                yield Fault.SENSOR, f"{what} is not valid: status 0x{int(value):02X} (cable break, overload)"
+                yield BusFault.SENSOR, f"{what} is not valid: status 0x{int(value):02X} (cable break, overload)"
         opening, supply = self._opening(found), found.get("pressure_supply", NAN)
         if problem := self._check.problem(stamp_ns, found["position"], opening, supply, bool(self.closed)):
-            yield Fault.POSITION, problem
+            yield BusFault.POSITION, problem
 
     def sample(self, stamp_ns: int, drive: float, found: Mapping[str, float]) -> PlantSample:
         """The sample of a cycle; `drive` [V] is what was sent with its SYNC. What nobody measures is NaN."""

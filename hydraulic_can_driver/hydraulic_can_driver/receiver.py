@@ -14,7 +14,7 @@ import can
 
 from hydraulic_can_driver.bus import Bus, Node
 from hydraulic_can_driver.can_bus import hears_itself
-from hydraulic_can_driver.faults import Fault, FaultLatch
+from hydraulic_can_driver.faults import BusFault, FaultLatch
 from hydraulic_can_driver.frames import Frames
 from hydraulic_plant_node.pacing import request_realtime
 
@@ -34,13 +34,22 @@ _SURPLUS, _FORGOTTEN = 2.5, 0.01
 class Receiver(can.Listener):
     """Listens to a bus; sends nothing.
 
-    `heard[node]` is when a heartbeat of the node came (monotonic, s), `states[node]` the NMT state it told. While
+    `heard[node]` is when a heartbeat of the node came (`now`, s), `states[node]` the NMT state it told. While
     `watching`, a node that restarts or leaves OPERATIONAL is a fault, as is a frame that only the driver may send.
     Where a `priority` is set, the receiving thread asks for it with the next frame.
     """
 
-    def __init__(self, bus: Bus, frames: Frames, faults: FaultLatch, interface: str, kernel_sync: bool = False) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        frames: Frames,
+        faults: FaultLatch,
+        interface: str,
+        kernel_sync: bool = False,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.frames, self._faults = frames, faults
+        self._now = now
         self.watching = False
         self.heard: dict[str, float] = {}
         self.states: dict[str, int] = {}
@@ -73,7 +82,7 @@ class Receiver(can.Listener):
             self.priority = 0
         if msg.is_error_frame:
             if msg.arbitration_id & _BUS_OFF:
-                self._faults.report(Fault.BUS, "the controller is bus-off: check wiring, termination and bit rate")
+                self._faults.report(BusFault.BUS, "the controller is bus-off: check wiring, termination and bit rate")
             return
         if msg.is_remote_frame or msg.is_extended_id:
             self.unexpected += 1
@@ -88,7 +97,7 @@ class Receiver(can.Listener):
 
     def on_error(self, exc: Exception) -> None:
         """Receiving failed."""
-        self._faults.report(Fault.BUS, f"receiving failed: {exc or type(exc).__name__}")
+        self._faults.report(BusFault.BUS, f"receiving failed: {exc or type(exc).__name__}")
 
     def stop(self) -> None:
         """Nothing to release."""
@@ -96,16 +105,17 @@ class Receiver(can.Listener):
     def sending(self, cob_id: int) -> None:
         """The driver is about to send a frame, which may come back to it."""
         if self._echo:
-            self._outstanding.setdefault(cob_id, deque(maxlen=5000)).append(time.monotonic())
+            self._outstanding.setdefault(cob_id, deque(maxlen=5000)).append(self._now())
 
     def _own(self, cob_id: int) -> None:
-        echoes, now = self._outstanding.get(cob_id, deque()), time.monotonic()
+        echoes, now = self._outstanding.get(cob_id, deque()), self._now()
         while echoes:
             if now - echoes.popleft() < _ECHO_S:
                 return
         self.unexpected += 1
         if self.watching:
-            self._faults.report(Fault.SECOND_MASTER, f"a second master on the bus: COB-ID 0x{cob_id:03X} is not ours")
+            text = f"a second master on the bus: COB-ID 0x{cob_id:03X} is not ours"
+            self._faults.report(BusFault.SECOND_MASTER, text)
 
     def _kernel(self, stamp_ns: int) -> None:
         passed = (stamp_ns - self.frames.sync_ns) / self._sync_period_ns
@@ -120,12 +130,12 @@ class Receiver(can.Listener):
             self.unexpected += 1
             return
         state = data[0] & 0x7F
-        self.heard[node.name], self.states[node.name] = time.monotonic(), state
+        self.heard[node.name], self.states[node.name] = self._now(), state
         if self.watching and state == BOOT_UP:
-            self._faults.report(Fault.RESTART, f"{node.name} has restarted: configure it anew")
+            self._faults.report(BusFault.RESTART, f"{node.name} has restarted: configure it anew")
         elif self.watching and state != OPERATIONAL:
             told = STATES.get(state, f"state {state}")
-            self._faults.report(Fault.RESTART, f"{node.name} is {told}, not OPERATIONAL: configure it anew")
+            self._faults.report(BusFault.RESTART, f"{node.name} is {told}, not OPERATIONAL: configure it anew")
 
     def _emergency(self, node: Node, data: bytes) -> None:
         if len(data) != _EMERGENCY.size:
@@ -137,4 +147,4 @@ class Receiver(can.Listener):
             return
         text = f"{node.name}: EMCY 0x{code:04X}, error register 0x{register:02X}, {detail.hex(' ')}"
         self.emergencies.append(text)
-        self._faults.report(Fault.EMERGENCY, text)
+        self._faults.report(BusFault.EMERGENCY, text)

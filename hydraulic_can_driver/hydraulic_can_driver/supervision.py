@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 
 from hydraulic_can_driver.bus import Bus
-from hydraulic_can_driver.faults import Fault, FaultLatch
+from hydraulic_can_driver.faults import BusFault, FaultLatch
 from hydraulic_can_driver.frames import Frames
 from hydraulic_can_driver.receiver import STATES, Receiver
 
@@ -42,7 +41,7 @@ class Supervision:
         self._worst_ns = 0
 
     def begin(self, now: float) -> None:
-        """Everything is well at `now` (monotonic, s)."""
+        """Everything is well at `now` (s)."""
         self._began = self._last_sync = now
         self._missed_in_a_row = 0
 
@@ -59,11 +58,11 @@ class Supervision:
     def check(self, now: float) -> None:
         """Before a cycle: have the devices been heard, and was the last SYNC not long ago?"""
         if silent := self.silent(now):
-            self._faults.report(Fault.HEARTBEAT, f"no heartbeat: {', '.join(silent)}")
-        gap = now - self._last_sync
-        if gap > self._bus.monitoring.sync_gap:
-            limit = self._bus.monitoring.sync_gap
-            self._faults.report(Fault.SYNC, f"no SYNC for {gap:.3f} s, allowed are {limit:g} s: the loop was held up")
+            self._faults.report(BusFault.HEARTBEAT, f"no heartbeat: {', '.join(silent)}")
+        gap, limit = now - self._last_sync, self._bus.monitoring.sync_gap
+        if gap > limit:
+            text = f"no SYNC for {gap:.3f} s, allowed are {limit:g} s: the loop was held up"
+            self._faults.report(BusFault.SYNC, text)
         self._last_sync = now
 
     def cycle(self, stamp_ns: int, complete: bool) -> None:
@@ -77,17 +76,17 @@ class Supervision:
         if complete:
             self._missed_in_a_row = 0
             if self._frames.behind >= patience:
-                self._faults.report(Fault.FRAMES, f"frames come late: {', '.join(self._frames.debtors())}")
+                self._faults.report(BusFault.FRAMES, f"frames come late: {', '.join(self._frames.debtors())}")
             return
         self.missed += 1
         self._missed_in_a_row += 1
         if self._missed_in_a_row >= patience:
             who = ", ".join(self._frames.lacking()) or "the SYNC"
-            self._faults.report(Fault.FRAMES, f"no frames in time in {self._missed_in_a_row} cycles in a row: {who}")
+            self._faults.report(BusFault.FRAMES, f"no frames in time in {self._missed_in_a_row} cycles in a row: {who}")
 
-    def report(self) -> Mapping[str, str]:
-        """Rows for the diagnostics."""
-        receiver, now = self._receiver, time.monotonic()
+    def report(self, now: float) -> Mapping[str, str]:
+        """Rows for the diagnostics at `now` (s)."""
+        receiver = self._receiver
         rows = {
             "bus_load_percent": f"{100.0 * self._load:.1f}",
             "cycles": str(self.cycles),

@@ -33,6 +33,9 @@ class Beat(Protocol):
     lead_ns: int
     """How long before its SYNC a drive is sent."""
 
+    sender: str
+    """Who sends the SYNC, in the diagnostics."""
+
     def start(self) -> None:
         """Begin to send SYNCs."""
 
@@ -54,6 +57,8 @@ class Beat(Protocol):
 
 class LoopBeat:
     """The control loop itself sends each SYNC, a little after the drive and on its instant."""
+
+    sender = "control loop"
 
     def __init__(self, master: Master, frames: Frames, period_ns: int) -> None:
         self._master, self._frames, self._period_ns = master, frames, period_ns
@@ -87,6 +92,27 @@ class LoopBeat:
         return True
 
 
+class LockstepBeat(LoopBeat):
+    """As `LoopBeat`, but the SYNC goes out at once: its instant is the stamp, whatever the wall clock says."""
+
+    sender = "control loop, in lockstep"
+
+    def __init__(self, master: Master, frames: Frames, period_ns: int) -> None:
+        super().__init__(master, frames, period_ns)
+        self.lead_ns = 0
+
+    def next_sync(self) -> int:
+        """One period after the last."""
+        return (self._frames.sync_ns or time.time_ns()) + self._period_ns
+
+    def exchange(self, cob_id: int, drive_frame: bytes, sync_ns: int) -> bool:
+        """See `Beat.exchange`."""
+        self._master.send(cob_id, drive_frame)
+        self._frames.begin(sync_ns)
+        self._master.send(SYNC, b"")
+        return True
+
+
 class KernelBeat:
     """The kernel sends the SYNC (SocketCAN's broadcast manager); the loop keeps step with what it hears of it.
 
@@ -94,6 +120,8 @@ class KernelBeat:
     the kernel's timer that is trimmed (`kernel_timer`). Which SYNC a drive belongs to is told by the clock and never by
     counting, so that one that is missing, late, or heard late concerns its own cycle only.
     """
+
+    sender = "kernel"
 
     def __init__(self, master: Master, frames: Frames, period_ns: int) -> None:
         self._master, self._frames, self._period_ns = master, frames, period_ns

@@ -206,7 +206,8 @@ def test_a_plant_that_stays_at_fault_fails_the_step(runs: Any, tmp_path: Path) -
         )
 
 
-def test_over_can_the_demo_brings_its_own_devices_and_touches_no_real_bus() -> None:
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_over_can_the_demo_brings_its_own_devices_and_touches_no_real_bus(lockstep: bool) -> None:
     """A real actuator is not for a demo, least of all for its second attempt."""
 
     class Started:
@@ -217,10 +218,12 @@ def test_over_can_the_demo_brings_its_own_devices_and_touches_no_real_bus() -> N
             pass
 
     crew = Started()
-    values = online._start_devices(crew, Path("m.yaml"), Said())  # type: ignore[arg-type]
+    values = online._start_devices(crew, Path("m.yaml"), Said(), lockstep)  # type: ignore[arg-type]
     assert values["interface"] == "udp_multicast"
     assert crew.module == "hydraulic_bringup.verbs.virtual_bench"
-    told = dict(zip(crew.arguments[::2], crew.arguments[1::2], strict=True))
+    options = [option for option in crew.arguments if option != "--lockstep"]
+    assert (len(options) < len(crew.arguments)) == lockstep
+    told = dict(zip(options[::2], options[1::2], strict=True))
     assert told["--interface"] == values["interface"]
     assert told["--channel"] == values["channel"]
     assert told["--bus"] == values["bus"]
@@ -240,14 +243,14 @@ def bag_without(folder: Path, lost: list[int], samples: int = 2000) -> Path:
 
 def test_a_whole_bag_is_read_without_a_word(tmp_path: Path) -> None:
     said = Said()
-    (record,) = offline.read_bag(bag_without(tmp_path / "chirp", []), said)
+    (record,) = offline.read_bag(bag_without(tmp_path / "chirp", []), said, 0.0)
     assert len(record) == 2000
     assert said.texts == []
 
 
 def test_a_few_missing_samples_are_interpolated_and_told(tmp_path: Path) -> None:
     said = Said()
-    (record,) = offline.read_bag(bag_without(tmp_path / "chirp", [500, 501, 900]), said)
+    (record,) = offline.read_bag(bag_without(tmp_path / "chirp", [500, 501, 900]), said, 0.01)
     assert len(record) == 2000
     assert record["position"] == pytest.approx(1e-6 * np.arange(2000), abs=1e-12)
     assert said.texts == ["3 of 2000 samples of chirp are missing: interpolated"]
@@ -256,14 +259,19 @@ def test_a_few_missing_samples_are_interpolated_and_told(tmp_path: Path) -> None
 def test_many_missing_samples_fail_the_step(tmp_path: Path) -> None:
     bag = bag_without(tmp_path / "chirp", list(range(500, 600)))
     with pytest.raises(DemoError, match="'read the bag': 100 of 2000 samples of chirp are missing"):
-        offline.read_bag(bag, Said())
+        offline.read_bag(bag, Said(), 0.01)
+
+
+def test_in_lockstep_no_sample_may_be_missing(tmp_path: Path) -> None:
+    with pytest.raises(DemoError, match="'read the bag': 1 of 2000 samples of chirp are missing"):
+        offline.read_bag(bag_without(tmp_path / "chirp", [900]), Said(), 0.0)
 
 
 def test_a_bag_that_is_none_fails_the_step(tmp_path: Path) -> None:
     (tmp_path / "chirp").mkdir()
     (tmp_path / "chirp" / "chirp_0.mcap").write_bytes(b"\x89MCAP0\r\n")
     with pytest.raises(DemoError, match="read the bag"):
-        offline.read_bag(tmp_path / "chirp", Said())
+        offline.read_bag(tmp_path / "chirp", Said(), 0.0)
 
 
 @pytest.fixture
@@ -302,6 +310,7 @@ def test_bad_input_is_one_line_and_exit_code_2(
         (["--columns", "split"], "--columns"),
         (["--record", str(SAMPLE), "--quick"], "--quick"),
         (["--record", str(SAMPLE), "--plant", "sim"], "--plant"),
+        (["--record", str(SAMPLE), "--no-lockstep"], "--lockstep"),
         (["--plant", "rocket"], "rocket"),
     ],
 )

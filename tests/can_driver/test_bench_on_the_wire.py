@@ -16,7 +16,7 @@ import pytest
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.cia408 import State
 from hydraulic_can_driver.errors import DeviceError
-from hydraulic_can_driver.faults import Fault
+from hydraulic_can_driver.faults import BusFault
 
 
 def test_boot_start_drive_and_stop(bench: Bench, wire: Any, loop_of: Callable[..., Any], wait_until: Any) -> None:
@@ -144,7 +144,7 @@ def test_fault_in_the_status_word_and_its_reset(
     wait_until(lambda: (0x510, bytes.fromhex("0700 6606")) in wire.log, "1 V on the wire")
     wire.follows = False
     wire.answers[0x490] = bytes.fromhex("0300 0000")  # FAULT_HOLD, without an EMCY
-    wait_until(lambda: Fault.VALVE in bench.faults, "the fault")
+    wait_until(lambda: BusFault.VALVE in bench.faults, "the fault")
     assert "FAULT_HOLD (0x0003)" in bench.problem
     wait_until(lambda: wire.log[-1] and wire.sent(0x510)[-1][1] == bytes.fromhex("0100 0000"), "0 V and Disabled")
     before = len(wire.sent(0x510))
@@ -188,7 +188,7 @@ def test_second_master(name: str, bench: Bench, wire: Any, loop_of: Callable[...
     wait_until(lambda: (0x510, bytes.fromhex("0700 6606")) in wire.log, "1 V on the wire")
     cob_id, data = FOREIGN[name]
     wire.send(cob_id, bytes.fromhex(data))
-    wait_until(lambda: Fault.SECOND_MASTER in bench.faults, "the fault")
+    wait_until(lambda: BusFault.SECOND_MASTER in bench.faults, "the fault")
     assert f"0x{cob_id:03X}" in bench.problem
     wait_until(lambda: wire.sent(0x510)[-1][1] == bytes.fromhex("0100 0000"), "0 V and Disabled")
 
@@ -225,7 +225,7 @@ def test_a_loop_that_was_held_up(bench: Bench, wire: Any, loop_of: Callable[...,
     loop.hold.clear()
     time.sleep(0.8)
     loop.hold.set()
-    wait_until(lambda: Fault.SYNC in bench.faults, "the fault")
+    wait_until(lambda: BusFault.SYNC in bench.faults, "the fault")
     assert "held up" in bench.problem
     wait_until(lambda: wire.sent(0x510)[-1][1] == bytes.fromhex("0100 0000"), "0 V and Disabled")
 
@@ -244,7 +244,7 @@ def test_an_interface_that_fails(
         raise can.CanOperationError("Network is down")
 
     monkeypatch.setattr(bench.master.can, "send", down)
-    wait_until(lambda: Fault.BUS in bench.faults, "the fault")
+    wait_until(lambda: BusFault.BUS in bench.faults, "the fault")
     assert "Network is down" in bench.problem
     loop.ending = True
     loop.join()

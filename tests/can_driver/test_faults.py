@@ -12,7 +12,7 @@ import pytest
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.cia408 import State
 from hydraulic_can_driver.errors import DeviceError
-from hydraulic_can_driver.faults import Fault
+from hydraulic_can_driver.faults import BusFault
 from hydraulic_can_driver.virtual import faults as upset
 
 
@@ -24,7 +24,7 @@ class Case:
     """
 
     upset: Any
-    fault: Fault
+    fault: BusFault
     words: str
     lasts: bool = True
     after: str = "reset"
@@ -34,24 +34,26 @@ class Case:
 SOON = {"missed_cycles": 20}
 CASES = {
     "heartbeat lost": Case(
-        upset.HeartbeatStop("lvdt"), Fault.HEARTBEAT, "heartbeat: lvdt", settings={"heartbeats": 10}
+        upset.HeartbeatStop("lvdt"), BusFault.HEARTBEAT, "heartbeat: lvdt", settings={"heartbeats": 10}
     ),
-    "EMCY of a sensor": Case(upset.Emergency("lvdt", 0x5000), Fault.EMERGENCY, "lvdt: EMCY 0x5000"),
-    "EMCY of the valve": Case(upset.Emergency("valve", 0x3412, 4), Fault.EMERGENCY, "valve: EMCY 0x3412"),
-    "status fault": Case(upset.StatusFault("valve"), Fault.EMERGENCY, "valve: EMCY 0x3412"),
-    "missing frame": Case(upset.MissingPdo("pressure_b"), Fault.FRAMES, "pressure_b", after="activate", settings=SOON),
-    "late frame": Case(upset.LatePdo("lvdt", 0.05), Fault.FRAMES, "lvdt", after="activate", settings=SOON),
-    "wrong length": Case(upset.PdoLength("lvdt", 3), Fault.LENGTH, "3 bytes; mapped are 7", after="configure"),
-    "jump": Case(upset.PositionJump("lvdt", 0.3), Fault.POSITION, "jumps by 0.3", lasts=False),
-    "out of stroke": Case(upset.PositionStuck("lvdt", 0.9), Fault.POSITION, "out of the stroke"),
-    "frozen": Case(upset.PositionFrozen("lvdt"), Fault.POSITION, "frozen", lasts=False),
-    "cable of a transducer": Case(upset.CableBreak("pressure_a"), Fault.SENSOR, "pressure_a is not valid"),
-    "cable of the LVDT": Case(upset.CableBreak("lvdt"), Fault.EMERGENCY, "lvdt: EMCY"),
-    "cable of the spool": Case(upset.CableBreak("valve"), Fault.EMERGENCY, "valve: EMCY"),
-    "power cut of a sensor": Case(upset.PowerCut("lvdt"), Fault.FRAMES, "lvdt", after="configure", settings=SOON),
-    "power cut of the valve": Case(upset.PowerCut("valve"), Fault.FRAMES, "valve", after="configure", settings=SOON),
-    "connector out": Case(upset.Unplugged("lvdt"), Fault.FRAMES, "lvdt", after="activate", settings=SOON),
-    "bus-off": Case(upset.BusOff(), Fault.BUS, "bus-off", lasts=False),
+    "EMCY of a sensor": Case(upset.Emergency("lvdt", 0x5000), BusFault.EMERGENCY, "lvdt: EMCY 0x5000"),
+    "EMCY of the valve": Case(upset.Emergency("valve", 0x3412, 4), BusFault.EMERGENCY, "valve: EMCY 0x3412"),
+    "status fault": Case(upset.StatusFault("valve"), BusFault.EMERGENCY, "valve: EMCY 0x3412"),
+    "missing frame": Case(
+        upset.MissingPdo("pressure_b"), BusFault.FRAMES, "pressure_b", after="activate", settings=SOON
+    ),
+    "late frame": Case(upset.LatePdo("lvdt", 0.05), BusFault.FRAMES, "lvdt", after="activate", settings=SOON),
+    "wrong length": Case(upset.PdoLength("lvdt", 3), BusFault.LENGTH, "3 bytes; mapped are 7", after="configure"),
+    "jump": Case(upset.PositionJump("lvdt", 0.3), BusFault.POSITION, "jumps by 0.3", lasts=False),
+    "out of stroke": Case(upset.PositionStuck("lvdt", 0.9), BusFault.POSITION, "out of the stroke"),
+    "frozen": Case(upset.PositionFrozen("lvdt"), BusFault.POSITION, "frozen", lasts=False),
+    "cable of a transducer": Case(upset.CableBreak("pressure_a"), BusFault.SENSOR, "pressure_a is not valid"),
+    "cable of the LVDT": Case(upset.CableBreak("lvdt"), BusFault.EMERGENCY, "lvdt: EMCY"),
+    "cable of the spool": Case(upset.CableBreak("valve"), BusFault.EMERGENCY, "valve: EMCY"),
+    "power cut of a sensor": Case(upset.PowerCut("lvdt"), BusFault.FRAMES, "lvdt", after="configure", settings=SOON),
+    "power cut of the valve": Case(upset.PowerCut("valve"), BusFault.FRAMES, "valve", after="configure", settings=SOON),
+    "connector out": Case(upset.Unplugged("lvdt"), BusFault.FRAMES, "lvdt", after="activate", settings=SOON),
+    "bus-off": Case(upset.BusOff(), BusFault.BUS, "bus-off", lasts=False),
 }
 
 
@@ -83,7 +85,7 @@ def test_fault(name: str, rig: Callable[..., Any], wait_until: Any) -> None:
         wait_until(lambda: accepted(here.bench), "a reset that is accepted")
     else:
         if case.after == "configure":
-            wait_until(lambda: {Fault.RESTART, Fault.LENGTH} & here.bench.faults.latched, "a fault that stays")
+            wait_until(lambda: {BusFault.RESTART, BusFault.LENGTH} & here.bench.faults.latched, "a fault that stays")
             with pytest.raises(DeviceError, match="configure"):
                 here.bench.reset()
         loop = here.again(boot=case.after == "configure")

@@ -1,12 +1,11 @@
 """The same excitation of the same plant, once through the simulator and once through the bus: the same model comes out.
 
-Cycle by cycle, not in real time, so that no sample is lost on a busy machine: everything else (frames, coding,
+In lockstep, so that no sample is lost on a busy machine: everything else (frames, coding,
 quantisation, state machines, the SYNC that takes the drive over) is as on a bench.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -33,16 +32,6 @@ RATE, SECONDS = 500.0, 12.0
 MODEL = "moog_mcr_m_1002_bench"
 NOISE = {"position_noise": 20e-6, "pressure_noise": 15e3}  # of the demo's sensors
 DT = 0.02  # sampling time of the identified models, s
-
-
-class Lockstep:
-    """Counts one period per SYNC, however late it comes."""
-
-    def sync(self, now: float) -> int:
-        return 1
-
-    def overdue(self, now: float, patience: float) -> int:
-        return 0
 
 
 def record(name: str, step: Callable[[int, float], PlantSample]) -> Record:
@@ -72,32 +61,23 @@ def simulated() -> Record:
 
 @pytest.fixture
 def over_can(patient: Bus) -> Iterator[Record]:
-    bus = replace(patient, rate=RATE, channel="same records", master=replace(patient.master, lost_after=60.0))
-    bus = replace(bus, monitoring=replace(bus.monitoring, frames_within=0.95, sync_gap=60.0, heartbeats=100))
-    valve = replace(bus.valve, receive=(replace(bus.drive_pdo, timeout=60.0),))
-    # Nobody waits in real time here: the loop is given ten seconds for the frames of a SYNC.
-    bus = replace(bus, nodes={**bus.nodes, "valve": valve})
+    bus = replace(patient, rate=RATE, channel="same records")
     line = open_can(bus.interface, bus.channel)
-    devices = VirtualBench(bus, line, ModelPlant(load_model(MODEL), RATE, seed=2, **NOISE))
+    devices = VirtualBench(bus, line, ModelPlant(load_model(MODEL), RATE, seed=2, **NOISE), lockstep=True)
     devices.start()
-    devices._clock = Lockstep()  # type: ignore[assignment]
-    bench = Bench(bus)
-    devices.valve.store(0x2201, 0, 60_000)
+    bench = Bench(bus, lockstep=True)
     bench.boot()
     bench.start()
-    bench._period = 10.0
-    bench.machine.ask(State.ACTIVE, time.monotonic())
-    while not bench.machine.active:
-        bench.cycle(time.time_ns(), 0.0)
-    bench.measuring.problems = lambda stamp, found: iter(())  # type: ignore[method-assign] - its clock is wall time
+    bench.machine.ask(State.ACTIVE, bench.now())
 
     def step(number: int, drive: float) -> PlantSample:
-        sample = bench.cycle(time.time_ns(), drive)
+        sample = bench.cycle(bench.beat.next_sync(), drive)
         assert sample is not None and not bench.problem, bench.problem
         return sample
 
+    while not bench.machine.active:
+        step(0, 0.0)
     yield record("can", step)
-    bench._period = 1.0 / RATE  # it stops by cycles of its own
     bench.close()
     devices.stop()
     line.shutdown()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hydraulic_can_driver.virtual.plant import SlotClock
+from hydraulic_can_driver.virtual.plant import SlotClock, SyncClock
 
 PERIOD = 0.002
 
@@ -38,3 +38,10 @@ def test_without_sync_time_passes_by_itself() -> None:
     assert clock.overdue(0.0305, 0.02) == 0
     assert clock.overdue(0.0405, 0.02) == 10
     assert clock.sync(0.0421) == 1
+
+
+def test_in_lockstep_only_syncs_count() -> None:
+    clock = SyncClock(PERIOD)
+    assert [clock.sync(time) for time in (0.002, 5.0, 5.0001)] == [1, 1, 1]
+    assert clock.overdue(100.0, 0.02) == 0
+    assert clock.now() == pytest.approx(3 * PERIOD)

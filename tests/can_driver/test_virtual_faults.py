@@ -32,7 +32,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("fault", "seen"), CASES, ids=lambda case: getattr(case, "node", "") and repr(case))
-def test_what_the_displacement_sensor_sends(far: Station, fault: faults.Fault, seen: str) -> None:
+def test_what_the_displacement_sensor_sends(far: Station, fault: faults.InjectedFault, seen: str) -> None:
     assert far.sync(POSITION) == HEALTHY
     far.bench.inject(fault)
     assert far.sync(POSITION) == seen
@@ -81,7 +81,7 @@ def test_heartbeats_stop_and_come_again(far: Station) -> None:
         (faults.StatusFault("valve"), 0x90, "1234050000000000", "0000000000000000"),
     ],
 )
-def test_emergencies(far: Station, fault: faults.Fault, cob_id: int, begins: str, ends: str) -> None:
+def test_emergencies(far: Station, fault: faults.InjectedFault, cob_id: int, begins: str, ends: str) -> None:
     far.drain()
     far.bench.inject(fault)
     assert far.frame(cob_id) == begins

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -10,8 +11,9 @@ from typing import Any
 
 import pytest
 
-from hydraulic_interfaces.contract import SERVICES, TOPICS, absolute
+from hydraulic_interfaces.contract import SERVICES, TOPICS, absolute, topic
 from hydraulic_interfaces.conversions import from_time
+from hydraulic_interfaces.qos import profile
 
 HERE = Path(__file__).parent
 
@@ -164,6 +166,40 @@ def test_moves_only_when_enabled_and_stops_when_the_source_falls_silent(
     wait_until(lambda: applied(states) == -0.5, "a drive re-armed by the next command")
     assert enable(client, False).success
     wait_until(lambda: applied(states) == 0.0, "0 V when disabled")
+
+
+def test_in_lockstep_each_sample_has_the_drive_that_answers_the_one_before(
+    start: Any, client: Any, wait_until: Any
+) -> None:
+    """However late the answers come: some are held up for longer than the watchdog tolerates in wall time."""
+    from sensor_msgs.msg import JointState
+
+    from hydraulic_interfaces.conversions import command_to_message
+    from hydraulic_interfaces.samples import Command
+
+    start("-p", "lockstep:=true", "-p", "enable_on_activate:=true")
+    command, states = client.publisher("command"), []
+
+    def drive(stamp_ns: int) -> float:
+        return 0.01 * (stamp_ns // 1_000_000 % 100)
+
+    def answer(state: JointState) -> None:
+        states.append(state)
+        if len(states) % 50 == 0:
+            time.sleep(0.1)
+        stamp_ns = from_time(state.header.stamp)
+        command.publish(command_to_message(Command(stamp_ns, "far", drive(stamp_ns))))
+
+    client.node.create_subscription(JointState, topic("state"), answer, profile("state", 10))
+    client.wake()
+    wait_until(lambda: sum(map(millivolts, states)) > 0.0, "a command that is obeyed")
+    first = len(states) + 20  # until plant and source are in step
+    wait_until(lambda: len(states) > first + 200, "200 samples")
+    found = states[first : first + 200]
+    stamps = [from_time(state.header.stamp) for state in found]
+    assert len({b - a for a, b in zip(stamps, stamps[1:], strict=False)}) == 1, "no sample is missing"
+    applied = [state.effort[1] for state in found]
+    assert applied[1:] == pytest.approx([drive(stamp) for stamp in stamps[:-1]], abs=1e-3)
 
 
 def test_positive_drive_extends(start: Any, client: Any, wait_until: Any) -> None:

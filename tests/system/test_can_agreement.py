@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -26,17 +25,6 @@ from hydraulic_sysid.linear.identification import Settings, identify_model
 
 RATE, SECONDS = 500.0, 16.0
 MODEL = load_model(Path(str(resources.files("hydraulic_bringup.demo") / "models" / "as_built.yaml")))
-PATIENCE = {"sync_gap": 10.0, "missed_cycles": 1000, "state_change": 10.0, "heartbeats": 100, "frames_within": 500.0}
-
-
-class EverySync:
-    """One period of the plant per SYNC, however fast or slowly they come."""
-
-    def sync(self, now: float) -> int:
-        return 1
-
-    def overdue(self, now: float, patience: float) -> int:
-        return 0
 
 
 def excitation() -> np.ndarray:
@@ -46,38 +34,27 @@ def excitation() -> np.ndarray:
 
 
 def over_can(drive: np.ndarray) -> list[PlantSample]:
-    """Every cycle by hand, as fast as they go; on a busy machine slower than in real time, which must not matter."""
-    bus = load_bus("bench")
-    bus = replace(
-        bus,
-        rate=RATE,
-        monitoring=replace(bus.monitoring, **PATIENCE),
-        master=replace(bus.master, lost_after=30.0),
-        limits=replace(bus.limits, frozen_time=30.0),
-        nodes={**bus.nodes, "valve": replace(bus.valve, receive=(replace(bus.drive_pdo, timeout=0.0),))},
-    )
+    """In lockstep: on a busy machine slower than in real time, which must not matter."""
+    bus = replace(load_bus("bench"), rate=RATE)
     line = can.Bus(interface="virtual", channel="agreement")
-    devices = VirtualBench(bus, line, ModelPlant(MODEL, RATE))
-    devices.valve.store(0x2201, 0, 0)
     samples: list[PlantSample] = []
-    with devices:
-        devices._clock = EverySync()  # type: ignore[assignment]
-        bench = Bench(bus, "virtual", "agreement")
+    with VirtualBench(bus, line, ModelPlant(MODEL, RATE), lockstep=True) as devices:
+        bench = Bench(bus, "virtual", "agreement", lockstep=True)
+
+        def step(u: float) -> None:
+            sample = bench.cycle(bench.beat.next_sync(), u)
+            assert sample is not None and not bench.problem, f"{bench.problem} after {len(samples)} samples"
+            samples.append(sample)
+
         try:
             bench.boot()
             bench.start()
             bench.follow(State.ACTIVE)
-            begun = stamp = time.time_ns()
-            period = round(1e9 / RATE)
-            while not bench.machine.active and stamp < begun + 1000 * period:
-                bench.cycle(stamp, 0.0)
-                stamp += period
-            assert bench.machine.active, bench.problem
+            while not bench.machine.active:
+                step(0.0)
+            samples.clear()
             for u in drive:
-                sample = bench.cycle(stamp, float(u))
-                assert sample is not None, f"{bench.problem} after {len(samples)} samples"
-                samples.append(sample)
-                stamp += period
+                step(float(u))
         finally:
             bench.close()
     line.shutdown()

@@ -47,16 +47,15 @@ def test_the_valve_is_left_disabled_before_its_power_is(run: Finished) -> None:
 @pytest.mark.parametrize("name", ["chirp", "multisine"])
 def test_the_record_is_that_of_the_plant_behind_the_devices(run: Finished, name: str) -> None:
     """Drive and position of one stamp belong together: the plant's own model on the recorded drive gives the record."""
-    (record,) = read_records(run.out / name, "resample")
+    (record,) = read_records(run.out / name)  # in which no sample is missing
     assert record.dt == pytest.approx(2e-3)
     assert {"command", "drive", "position", "velocity", "spool", "pressure_a", "pressure_b"} <= set(record.channels)
     assert record.description["experiment"]["event"] == "finished"
     plant = Plant(load_model(AS_BUILT))
     start = plant.initial_state(position=float(record["position"][0]))
     again = plant.simulate(np.asarray(record["drive"]), record.dt, start)
-    # Not more, since what a busy machine has lost is interpolated.
-    assert best_fit(record["position"], again.position) > 90.0
-    assert best_fit(record["velocity"], again.velocity) > 80.0
+    assert best_fit(record["position"], again.position) > 98.5  # the start is measured with noise
+    assert best_fit(record["velocity"], again.velocity) > 99.9
 
 
 def test_what_was_hidden_is_found_over_can_as_well(run: Finished) -> None:

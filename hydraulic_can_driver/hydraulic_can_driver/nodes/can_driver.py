@@ -11,7 +11,6 @@ from hydraulic_can_driver import readback
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_can_driver.cia408 import State, describe
-from hydraulic_can_driver.sync import KernelBeat
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_plant_node.nodes.running import run_plant
@@ -50,7 +49,7 @@ class CanPlant(PlantBackend):
         bus = load_bus(values["bus"])
         bus = replace(bus, rate=values["rate"] or bus.rate)
         self.hardware_id = f"can: {bus.name}"
-        self._bench = Bench(bus, values["interface"], values["channel"])
+        self._bench = Bench(bus, values["interface"], values["channel"], values["lockstep"])
         self._priority = min(values["realtime_priority"] + 1, 98) if values["realtime_priority"] else 0
         self._bench.boot()
         self._description = readback.description(bus, self._bench.readings)
@@ -123,9 +122,9 @@ class CanPlant(PlantBackend):
         status = bench.machine.status
         return {
             "valve": "unknown" if status is None else describe(status),
-            "sync": "kernel" if isinstance(bench.beat, KernelBeat) else "control loop",
+            "sync": bench.beat.sender,
             "settings": "; ".join(readback.sentences(bench.bus, bench.readings)) or "neutral",
-            **bench.supervision.report(),
+            **bench.supervision.report(bench.now()),
         }
 
     def description(self) -> Mapping[str, Any]:

@@ -14,9 +14,9 @@ from hydraulic_can_driver.bus import Bus
 from hydraulic_can_driver.can_bus import open_can
 from hydraulic_can_driver.errors import BusFileError
 from hydraulic_can_driver.virtual.device import Device
-from hydraulic_can_driver.virtual.faults import Fault
+from hydraulic_can_driver.virtual.faults import InjectedFault
 from hydraulic_can_driver.virtual.lvdt import Lvdt
-from hydraulic_can_driver.virtual.plant import Plant, Reading, SlotClock
+from hydraulic_can_driver.virtual.plant import Plant, Reading, SlotClock, SyncClock
 from hydraulic_can_driver.virtual.transducer import Transducer
 from hydraulic_can_driver.virtual.valve import Valve
 from hydraulic_can_driver.virtual.wiring import Event, Wiring
@@ -35,20 +35,24 @@ class VirtualBench:
     """Devices of ``bus`` on ``line`` over ``plant``; between `start` and `stop` they have power.
 
     ``line`` is a CAN bus or a connected `canopen.Network` of this bench's own (the driver has another one), or None:
-    then the bus file's interface and channel are opened. Usable as a context manager.
+    then the bus file's interface and channel are opened. In ``lockstep`` one SYNC is one period of the plant, and time
+    stands still without. Usable as a context manager.
 
     :raises BusFileError: a node has no EDS file, or a profile that is not virtual.
     :raises BusDownError: the interface cannot be opened.
     """
 
-    def __init__(self, bus: Bus, line: can.BusABC | canopen.Network | None, plant: Plant) -> None:
-        self.bus, self.plant = bus, plant
+    def __init__(
+        self, bus: Bus, line: can.BusABC | canopen.Network | None, plant: Plant, lockstep: bool = False
+    ) -> None:
+        self.bus, self.plant, self.lockstep = bus, plant, lockstep
         self.error: Exception | None = None
         self.syncs = 0
         self.listeners: list[Callable[[Event], None]] = []
         self._lock = threading.RLock()
-        self._waiting: list[tuple[Event, int, Fault]] = []
-        self._happening: list[Fault] = []
+        self._waiting: list[tuple[Event, int, InjectedFault]] = []
+        self._happening: list[InjectedFault] = []
+        self._timed: list[tuple[float, Callable[[], None]]] = []
         self._settling = False
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -58,14 +62,14 @@ class VirtualBench:
             self.network = line
         else:
             self.network = canopen.Network(line or open_can(bus.interface, bus.channel, bus.bitrate))
-        wiring = Wiring(self.network, bus, self._lock, self._tell, self._settle)
+        wiring = Wiring(self.network, bus, self._lock, self._tell, self._settle, self.now)
+        self._clock = self._new_clock()
         self.devices: dict[str, Device] = {}
         for name, spec in bus.nodes.items():
             if spec.profile not in PROFILES:
                 known = ", ".join(map(str, sorted(PROFILES)))
                 raise BusFileError(f"{bus.path}: node {name}: profile {spec.profile} is not virtual; there are {known}")
             self.devices[name] = PROFILES[spec.profile](spec, wiring)
-        self._clock = SlotClock(1.0 / bus.rate, time.time())
         self.reading = Reading(position=0.0)
 
     def __enter__(self) -> VirtualBench:
@@ -87,6 +91,10 @@ class VirtualBench:
         """What the spool is told at this moment, as drive [V]."""
         return self.valve.drive_now
 
+    def now(self) -> float:
+        """Time that the devices live in, s."""
+        return self._clock.now()
+
     def start(self) -> None:
         """Power on, in the order of the bus file."""
         if self._own_notifier:
@@ -95,14 +103,15 @@ class VirtualBench:
         for cob_id, handler in self._subscriptions():
             self.network.subscribe(cob_id, handler)
         with self._lock:
-            self._clock = SlotClock(1.0 / self.bus.rate, time.time())
+            self._clock = self._new_clock()
             for device in self.devices.values():
                 device.power_on()
             self._period()
             self._settle()
         self._ending.clear()
-        self._thread = threading.Thread(target=self._tick, name="virtual_bench", daemon=True)
-        self._thread.start()
+        if not self.lockstep:
+            self._thread = threading.Thread(target=self._tick, name="virtual_bench", daemon=True)
+            self._thread.start()
 
     def stop(self) -> None:
         """Power off; what was opened here is closed."""
@@ -121,20 +130,25 @@ class VirtualBench:
         elif self._own_notifier and self.network.notifier is not None:
             self.network.notifier.stop()
 
-    def inject(self, fault: Fault) -> None:
+    def inject(self, fault: InjectedFault) -> None:
         """Begin a fault now. KeyError where it names no device."""
         with self._lock:
             fault.begin(self)
 
-    def clear(self, fault: Fault) -> None:
+    def clear(self, fault: InjectedFault) -> None:
         """End a fault."""
         with self._lock:
             fault.end(self)
 
-    def at(self, kind: str, node: str, detail: str, fault: Fault, count: int = 1) -> None:
+    def at(self, kind: str, node: str, detail: str, fault: InjectedFault, count: int = 1) -> None:
         """Begin a fault when an event (see `Event`) happens for the ``count``-th time from now on."""
         with self._lock:
             self._waiting.append((Event(kind, node, detail), count, fault))
+
+    def after(self, seconds: float, act: Callable[[], None]) -> None:
+        """Do something when so much time of the devices has passed."""
+        with self._lock:
+            self._timed.append((self.now() + seconds, act))
 
     def _subscriptions(self) -> list[tuple[int, Callable[[int, bytearray, float], None]]]:
         return [
@@ -161,6 +175,8 @@ class VirtualBench:
             # By the time at which the interface received it: a SYNC that had to wait for this thread is not late.
             for _ in range(self._clock.sync(timestamp or time.time()) - 1):
                 self._period()
+            if self.lockstep:
+                self._watch()
             for device in self.devices.values():
                 device.take_over()
             self._period()
@@ -175,12 +191,21 @@ class VirtualBench:
         tick = min(max(0.5 / self.bus.rate, _TICK_S[0]), _TICK_S[1])
         while not self._ending.wait(tick):
             with self._lock, self._watched():
-                now = time.monotonic()
                 for _ in range(self._clock.overdue(time.time(), patience)):
                     self._period()
-                for device in self.devices.values():
-                    device.watch(now)
+                self._watch()
                 self._settle()
+
+    def _watch(self) -> None:
+        now = self.now()
+        for begin, act in [entry for entry in self._timed if entry[0] <= now]:
+            self._timed.remove((begin, act))
+            act()
+        for device in self.devices.values():
+            device.watch(now)
+
+    def _new_clock(self) -> SyncClock | SlotClock:
+        return SyncClock(1.0 / self.bus.rate) if self.lockstep else SlotClock(1.0 / self.bus.rate, time.time())
 
     def _period(self) -> None:
         """One sampling period of the plant, with the spool where the valve wants it now."""

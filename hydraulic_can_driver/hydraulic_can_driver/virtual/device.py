@@ -13,6 +13,7 @@ from typing import Any
 
 import can
 import canopen
+from canopen.nmt import NMT_STATES
 
 from hydraulic_can_driver.bus import Node
 from hydraulic_can_driver.errors import CodecError
@@ -23,6 +24,8 @@ from hydraulic_can_driver.virtual.process_data import ProcessData, Upsets
 from hydraulic_can_driver.virtual.wiring import Event, Wiring
 
 RESET_NODE, RESET_COMMUNICATION = 129, 130
+NMT_CODES = {name: code for code, name in NMT_STATES.items()}
+_HEARTBEAT = 0x700
 _HISTORY = 8
 
 
@@ -32,6 +35,8 @@ class _Served(canopen.LocalNode):
     def __init__(self, device: Device, node_id: int, dictionary: canopen.ObjectDictionary) -> None:
         super().__init__(node_id, dictionary)
         self._device = device
+        # Heartbeats go by the time of the bench, which `canopen`'s own thread does not know.
+        self.nmt.start_heartbeat = device.beat_every  # type: ignore[assignment, method-assign]
 
     def get_data(self, index: int, subindex: int, check_readable: bool = False) -> bytes:
         stored = super().get_data
@@ -60,6 +65,8 @@ class Device:
         self.pdos = ProcessData(self, wiring.network, wiring.lock, lambda number: self._say("rpdo", str(number)))
         self.objects = Objects(canopen.import_od(str(wiring.eds(spec)), spec.id))
         self._connected = False
+        self._beat_period = 0.0
+        self._next_beat = 0.0
 
     @property
     def powered(self) -> bool:
@@ -113,7 +120,6 @@ class Device:
         """Leave the bus, as one that is bus-off or whose connector is out."""
         if self.node is None or not self._connected:
             return
-        self.node.nmt.stop_heartbeat()
         self.pdos.close()
         self.wiring.network.subscribe(0, self.node.nmt.on_command)  # which `remove_network` takes away again
         self.node.remove_network()
@@ -153,8 +159,17 @@ class Device:
 
     def watch(self, now: float) -> None:
         """Time goes by: called every few milliseconds of ``now`` [s]."""
+        if self._connected and self.node is not None and self._beat_period > 0.0 and now >= self._next_beat:
+            self._next_beat = max(self._next_beat + self._beat_period, now)
+            with contextlib.suppress(can.CanError):
+                self.node.network.send_message(_HEARTBEAT + self.spec.id, bytes([NMT_CODES[self.node.nmt.state]]))
         if self.operational:
             self.pdos.transmit_due(now)
+
+    def beat_every(self, milliseconds: int) -> None:
+        """Send heartbeats with this period from now on, the first at once; 0 ends them."""
+        self._beat_period = 0.0 if self.upsets.no_heartbeat else milliseconds * 1e-3
+        self._next_beat = self.wiring.now()
 
     def stop_heartbeat(self, on: bool) -> None:
         """Whether heartbeats stop whatever 0x1017 says."""
@@ -270,10 +285,8 @@ class Device:
         """Heartbeats as 0x1017 says, unless they have stopped."""
         if self.node is None or not self._connected:
             return
-        if self.upsets.no_heartbeat:
-            self.node.nmt.stop_heartbeat()
-        elif self.node.nmt.state != "INITIALISING":
-            self.node.nmt.start_heartbeat(self.get(0x1017))
+        if self.node.nmt.state != "INITIALISING":
+            self.beat_every(self.get(0x1017))
 
     def _asked(self, kind: str, index: int, sub: int) -> None:
         """A master has asked for an object: what waited for this happens before the answer."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -33,6 +34,27 @@ class Plant(Protocol):
         """What holds at this instant; then ``dt`` [s] pass with the spool's set-point at ``drive`` [V]."""
 
 
+class SyncClock:
+    """Counts one period of the plant per SYNC and knows no other time: for a master in lockstep."""
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._periods = 0
+
+    def now(self) -> float:
+        """Time since the start, s."""
+        return self._periods * self._period
+
+    def sync(self, now: float) -> int:
+        """One."""
+        self._periods += 1
+        return 1
+
+    def overdue(self, now: float, patience: float) -> int:
+        """None: without a SYNC time stands still."""
+        return 0
+
+
 class SlotClock:
     """Counts the periods of the plant by the SYNCs that arrive, or by time where none do.
 
@@ -42,6 +64,7 @@ class SlotClock:
 
     def __init__(self, period: float, now: float) -> None:
         self.period = period
+        self.now = time.monotonic
         self._at = now  # when the newest period began, by the earliest SYNCs
 
     def sync(self, now: float) -> int:

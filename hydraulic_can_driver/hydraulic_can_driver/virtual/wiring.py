@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,8 @@ class Wiring:
     """The place of a device on the bench.
 
     Everything that a device does is done under `lock`. It tells what happens, and calls `settle` when it is through
-    with what came from the bus: whatever waited for that event happens then, before any answer is sent.
+    with what came from the bus: whatever waited for that event happens then, before any answer is sent. It lives in the
+    time `now` [s].
     """
 
     network: canopen.Network
@@ -42,7 +42,7 @@ class Wiring:
     lock: RLock
     tell: Callable[[Event], None]
     settle: Callable[[], None]
-    now: Callable[[], float] = time.monotonic
+    now: Callable[[], float]
 
     def eds(self, node: Node) -> Path:
         """The EDS file of a node: beside the bus file, or one of those that come with the package.

@@ -1,8 +1,9 @@
 """Node `/actuator/recorder`: every topic of the contract, serialised as it comes, into a rosbag2 folder.
 
 `~/status` (latched JSON) says "recording" once the bag is open and the subscriptions are up, with the number of
-publishers of each topic, and "closed" once the bag is finished, with the number of messages per topic. To commands it
-listens once the plant's states come: who waits for listeners to commands then loses no first sample.
+publishers of each topic and the stamp up to which the plant's streams have come (a plant in lockstep waits for it),
+and "closed" once the bag is finished, with the number of messages per topic. To commands it listens once the plant's
+states come: who waits for listeners to commands then loses no first sample.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ class Recorder(Node):
             if reason or self._recording.error:
                 self.close(reason)
             elif self._is_due(_STATUS_S):
-                self._tell("recording", publishers=self._intake.publishers())
+                self._tell("recording", publishers=self._intake.publishers(), reached_ns=reached)
         if self._is_due(_DIAGNOSTICS_S):
             self._health.publish(self.state, self._intake.missing(), clock)
 

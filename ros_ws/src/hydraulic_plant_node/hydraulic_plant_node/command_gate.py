@@ -63,6 +63,7 @@ class CommandGate:
         self._source = ""
         self._drive = 0.0
         self._heard_ns: int | None = None
+        self._obeyed_ns = (0, 0)
         # A new object per change of `enabled`: unlike a count it loses none where two threads change it at once.
         self._change = self._seen_change = object()
 
@@ -81,6 +82,11 @@ class CommandGate:
     def source(self) -> str:
         """Name of the source in command; empty when there is none."""
         return self._source
+
+    @property
+    def obeyed_ns(self) -> tuple[int, int]:
+        """Stamps of the last two commands that were obeyed, the newest first."""
+        return self._obeyed_ns
 
     @property
     def stopped(self) -> bool:
@@ -125,6 +131,7 @@ class CommandGate:
             self._source = command.source
             self._drive = min(max(command.drive, -self.limit), self.limit)
             self._heard_ns = now_ns
+            self._obeyed_ns = command.stamp_ns, self._obeyed_ns[0]
         if verdict is not Verdict.ACCEPTED:
             self.last_problem = f"{verdict.value} (source {command.source!r}, {command.drive} V)"
         return verdict

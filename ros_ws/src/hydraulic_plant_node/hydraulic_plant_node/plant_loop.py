@@ -1,6 +1,7 @@
 """The thread that runs a plant: one cycle per sampling instant, on absolute deadlines.
 
-A cycle: take the commands that have come, ask the gate for the drive, step the plant, publish its sample.
+A cycle: take the commands that have come, ask the gate for the drive, step the plant, publish its sample. In lockstep
+it then waits for the answer to that sample before plant time goes on.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Protocol
 
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.lockstep import Lockstep, LockstepPorts
 from hydraulic_plant_node.pacing import (
     Pacer,
     Wakefulness,
@@ -31,11 +33,8 @@ _SWITCH_INTERVAL_S = 5e-5
 _OWN_CLOCK_CATCH_UP = 50
 
 
-class LoopPorts(Protocol):
+class LoopPorts(LockstepPorts, Protocol):
     """Where commands come from and samples go to."""
-
-    def take_commands(self, gate: CommandGate, now_ns: int) -> None:
-        """Put every waiting command through the gate."""
 
     def publish(self, sample: PlantSample) -> None:
         """Send a sample to everybody."""
@@ -48,18 +47,23 @@ class LoopPorts(Protocol):
 class LoopTiming:
     """Sampling `period_ns` in plant time; `factor` plant seconds per wall second, 1 unless `own_clock`.
 
-    With `own_clock` the plant's time is published and everybody else follows it; without, it is wall time.
+    With `own_clock` the plant's time is published and everybody else follows it; without, it is wall time. In
+    `lockstep`, which needs that clock, it goes on when the last sample has been answered, and `factor` is the most;
+    where nobody answers it is wall time at the most.
     `priority` > 0 asks for real-time scheduling, and does without where it is not permitted.
     """
 
     period_ns: int
     factor: float = 1.0
     own_clock: bool = False
+    lockstep: bool = False
     priority: int = 0
 
     def __post_init__(self) -> None:
         if self.factor != 1.0 and not self.own_clock:
             raise ValueError(f"real_time_factor is {self.factor:g}: only with publish_clock may it differ from 1")
+        if self.lockstep and not self.own_clock:
+            raise ValueError("lockstep: only a plant with a clock of its own can wait")
 
 
 class PlantLoop:
@@ -87,6 +91,7 @@ class PlantLoop:
         self.drive = 0.0
         self.last_stamp_ns = last_stamp_ns
         self._backend, self._gate, self._ports, self._timing = backend, gate, ports, timing
+        self.lockstep = Lockstep(gate, ports, timing.period_ns) if timing.lockstep else None
         self._stopping = False
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plant_loop", daemon=True)
@@ -141,7 +146,9 @@ class PlantLoop:
         try:
             if self._timing.priority > 0:
                 self.scheduling = request_realtime(self._timing.priority)
-            self._cycle(Pacer().wait)
+            self._gate.forget()  # a drive that an earlier run was ended with
+            cycle = self._cycle if self.lockstep is None else self._cycle_in_lockstep
+            cycle(Pacer().wait)
         except Exception as error:
             # Whatever a backend throws: the drive must end at 0 V, and somebody must hear of it.
             self.error = error
@@ -155,8 +162,7 @@ class PlantLoop:
             self._ended.set()
 
     def _cycle(self, wait: Callable[[int], int]) -> None:
-        timing, gate, ports, monitor = self._timing, self._gate, self._ports, self.monitor
-        gate.forget()  # a drive that an earlier run was ended with
+        timing, ports, monitor = self._timing, self._ports, self.monitor
         wall_period = timing.period_ns / timing.factor
         catch_up = _OWN_CLOCK_CATCH_UP if timing.own_clock else self._backend.catch_up
         origin = self._backend.first_instant(time.monotonic_ns() + round(wall_period))
@@ -181,22 +187,43 @@ class PlantLoop:
             now = stamp if timing.own_clock else time.time_ns()
             if timing.own_clock:
                 ports.publish_clock(stamp + (behind - lost) * timing.period_ns)
-            ports.take_commands(gate, now)
-            if self._backend.fault:
-                gate.stop(self._backend.fault)
-            drive = gate.drive(now)
+            drive = self._drive(now)
             for _ in range(behind - lost + 1):
                 self._sample(first_stamp + slot * timing.period_ns, drive)
                 slot += 1
         wait(origin + round(slot * wall_period))
         self._sample(first_stamp + slot * timing.period_ns, 0.0)
 
-    def _sample(self, stamp_ns: int, drive: float) -> None:
+    def _cycle_in_lockstep(self, wait: Callable[[int], int]) -> None:
+        timing, lockstep = self._timing, self.lockstep
+        assert lockstep is not None
+        answered_period = round(timing.period_ns / timing.factor)
+        due = time.monotonic_ns() + timing.period_ns
+        stamp = max(time.time_ns(), self.last_stamp_ns) + timing.period_ns
+        while not self._stopping:
+            now = wait(due)
+            self.monitor.tick(now, now)
+            self._ports.publish_clock(stamp)
+            sampled = self._sample(stamp, self._drive(stamp))
+            answered = sampled and lockstep.hold(stamp, lambda: self._stopping)
+            stamp += timing.period_ns
+            period = answered_period if answered else max(answered_period, timing.period_ns)
+            due = max(due + period, now - _OWN_CLOCK_CATCH_UP * period)
+        self._sample(stamp, 0.0)
+
+    def _drive(self, now_ns: int) -> float:
+        self._ports.take_commands(self._gate, now_ns)
+        if self._backend.fault:
+            self._gate.stop(self._backend.fault)
+        return self._gate.drive(now_ns)
+
+    def _sample(self, stamp_ns: int, drive: float) -> bool:
         sample = self._backend.step(stamp_ns, drive, self._timing.period_ns * 1e-9)
         if sample is None:
             self.lost += 1
-            return
+            return False
         self._ports.publish(sample)
         self.drive = sample.drive
         self.last_stamp_ns = sample.stamp_ns
         self.samples += 1
+        return True

@@ -22,11 +22,11 @@ from .online import Steps
 
 MODEL = "model.yaml"
 """The model with what was missing, in the folder of the run."""
-MOST_MISSING = 0.01
-"""Share of a bag's samples that the demo interpolates without giving up."""
+MOST_MISSING = {"sim": 0.01, "can": 0.05}
+"""Share of a bag's samples that the demo interpolates without giving up, of a plant that follows the wall clock.
 
-MOST_MISSING_OVER_CAN = 0.05
-"""The same for a plant in real time: a cycle that it misses is lost, where the simulator makes up for it."""
+A cycle that is missed on the bus is lost, where the simulator makes up for it.
+"""
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,11 @@ class Analysis:
     left_out: str = ""
 
 
-def read_bag(bag: Path, steps: Steps, most: float = MOST_MISSING) -> list[Record]:
+def read_bag(bag: Path, steps: Steps, most: float) -> list[Record]:
     """Records of a bag that was just made.
 
-    Samples are missing where the machine held the plant or the recorder up. A few are interpolated, and the user is
-    told; a record of the user's own is not treated so, since there a gap may mean something.
+    Without lockstep samples are missing where the machine held the plant or the recorder up. A few are interpolated,
+    and the user is told; a record of the user's own is not treated so, since there a gap may mean something.
 
     :raises DemoError: more than the share ``most`` of the samples is missing, or the bag is no record.
     """

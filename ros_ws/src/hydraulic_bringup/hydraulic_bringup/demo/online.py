@@ -1,4 +1,7 @@
-"""The half of the demo that runs the graph: each experiment excites the plant and leaves a bag."""
+"""The half of the demo that runs the graph: each experiment excites the plant and leaves a bag.
+
+In lockstep the plant waits for excitation and recorder, so that a busy machine takes longer and nothing else.
+"""
 
 from __future__ import annotations
 
@@ -32,11 +35,14 @@ SENSORS = {
 BUS = "bench"
 # Nothing can break here, and a laptop that holds a process up for longer than the bench's 50 ms should not end a demo.
 WATCHDOG_S = 0.2
+SILENCE_S = 10.0  # of the plant, until the excitation aborts
+FASTEST = 10.0  # plant seconds per second of a simulator in lockstep, where the answers come so fast
 # A simulated actuator may be excited again after an abort, also behind virtual CAN devices.
 ATTEMPTS = 2
 _CLIENT = "hydraulic_bringup.nodes._graph_client"
 _START_S = 90.0  # the first start on a machine compiles the physics
 _STEP_S = 20.0
+_STRETCHED = 20.0  # by how much a busy machine may stretch an experiment
 _LAST_WORDS_S = 3.0
 
 
@@ -54,14 +60,15 @@ class Steps(Protocol):
 
 @dataclass(frozen=True)
 class Experiment:
-    """One excitation plan (a file), the name of its bag, and the silence [s] of the plant that aborts it."""
+    """One excitation plan (a file), and the name of its bag."""
 
     name: str
     plan: Path
-    state_timeout: float = 0.5
 
 
-def run(plant: str, model: Path, experiments: Sequence[Experiment], out: Path, steps: Steps) -> list[Path]:
+def run(
+    plant: str, model: Path, experiments: Sequence[Experiment], out: Path, steps: Steps, lockstep: bool = True
+) -> list[Path]:
     """Run the experiments on a plant and return their bags. Raises `DemoError`; ends every process it started."""
     module = PLANTS[plant]
     package = module.partition(".")[0]
@@ -70,7 +77,7 @@ def run(plant: str, model: Path, experiments: Sequence[Experiment], out: Path, s
     with private_domain() as env, Crew(out / "logs", env) as crew:
         client_class = import_module(_CLIENT).GraphClient
         with client_class() as client:
-            simulator = _start_plant(crew, client, plant, module, model, steps)
+            simulator = _start_plant(crew, client, plant, module, model, steps, lockstep)
             bags = [_experiment(crew, client, experiment, out, steps, ATTEMPTS) for experiment in experiments]
             steps.begin("stop the plant", 1.0)
             simulator.stop()
@@ -105,12 +112,12 @@ def _free_domain() -> Iterator[int]:
         yield int(number)
 
 
-def _start_plant(crew: Crew, client, plant: str, module: str, model: Path, steps: Steps) -> Child:
-    values: dict[str, object] = {"watchdog": WATCHDOG_S}
+def _start_plant(crew: Crew, client, plant: str, module: str, model: Path, steps: Steps, lockstep: bool) -> Child:
+    values: dict[str, object] = {"watchdog": WATCHDOG_S, "lockstep": lockstep}
     if plant == "can":
-        values |= _start_devices(crew, model, steps)
+        values |= _start_devices(crew, model, steps, lockstep)
     else:
-        values |= {"model": str(model), **SENSORS}
+        values |= {"model": str(model), **SENSORS, "real_time_factor": FASTEST if lockstep else 1.0}
     steps.begin("start the plant", 3.0)
     settings = [part for name, value in values.items() for part in ("-p", f"{name}:={value}")]
     child = crew.start("plant", module, "--ros-args", *settings)
@@ -131,7 +138,7 @@ def _start_plant(crew: Crew, client, plant: str, module: str, model: Path, steps
     return child
 
 
-def _start_devices(crew: Crew, model: Path, steps: Steps) -> dict[str, object]:
+def _start_devices(crew: Crew, model: Path, steps: Steps, lockstep: bool) -> dict[str, object]:
     """Start virtual CAN devices over the model, on a channel of their own; what the driver has to be told of them."""
     step = "start the virtual CAN devices"
     steps.begin(step, 3.0)
@@ -139,9 +146,8 @@ def _start_devices(crew: Crew, model: Path, steps: Steps) -> dict[str, object]:
     channel = f"239.74.{draw(0, 255)}.{draw(1, 254)}:{draw(20000, 30000)}"
     line = ("--interface", "udp_multicast", "--channel", channel)
     noise = ("--position-noise", str(SENSORS["position_noise"]), "--pressure-noise", str(SENSORS["pressure_noise"]))
-    child = crew.start(
-        "devices", "hydraulic_bringup.verbs.virtual_bench", "--bus", str(BUS), *line, "--model", str(model), *noise
-    )
+    module, what = "hydraulic_bringup.verbs.virtual_bench", ("--bus", str(BUS), "--model", str(model))
+    child = crew.start("devices", module, *what, *line, *noise, *(["--lockstep"] if lockstep else []))
     crew.wait(lambda: READY in child.log.read_text(errors="replace"), step, _START_S, steps.tick)
     steps.done()
     return {"bus": str(BUS), "interface": line[1], "channel": channel}
@@ -189,20 +195,21 @@ def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, st
     steps.done()
     step = f"{experiment.name}: excite and record"
     steps.begin(step, seconds + 2.0)
-    begun_ns = time.time_ns()
+    told = len(client.events)
     excitation = crew.start(
         f"excitation_{suffix}", "hydraulic_sysid.nodes.excitation", "--ros-args",
         "-p", f"plan:={experiment.plan}", "-p", "autostart:=true", "-p", "exit_when_done:=true",
-        "-p", f"start_timeout:={_STEP_S}", "-p", "listeners:=2", "-p", f"state_timeout:={experiment.state_timeout}",
+        "-p", f"start_timeout:={_STEP_S}", "-p", "listeners:=2", "-p", f"state_timeout:={SILENCE_S}",
     )  # fmt: skip
     excitation.may_end = (0, 1)  # 1: not started, or aborted
     recorder.may_end = (0,)
-    crew.wait(lambda: excitation.exit_code is not None, step, seconds + 2.0 * _STEP_S, steps.tick)
+    patience = _STRETCHED * seconds + 2.0 * _STEP_S
+    crew.wait(lambda: excitation.exit_code is not None, step, patience, steps.tick)
     if excitation.exit_code == 0:
         crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
         steps.done()
         return ""
-    ends = _aborts(client, begun_ns)
+    ends = _aborts(client, told)
     if not ends:
         words = excitation.tail()
         if NOT_STARTED not in words:
@@ -214,11 +221,11 @@ def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, st
     return str(ends[-1]["reason"])
 
 
-def _aborts(client, since_ns: int) -> list[dict]:
-    """The aborts that were told since then; the process may be gone a moment before its last words are here."""
+def _aborts(client, told: int) -> list[dict]:
+    """The aborts after so many events; the process may be gone a moment before its last words are here."""
     deadline = time.monotonic() + _LAST_WORDS_S
     while True:
-        ends = [event for event in client.events(since_ns) if event["event"] == ABORTED]
+        ends = [event for event in client.events[told:] if event["event"] == ABORTED]
         if ends or time.monotonic() > deadline:
             return ends
         time.sleep(0.05)

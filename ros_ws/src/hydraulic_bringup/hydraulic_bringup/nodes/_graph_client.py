@@ -43,7 +43,7 @@ class GraphClient:
         self._executor.add_node(self._node)
         self._status: dict[str, Any] = {}
         self._node.create_subscription(String, f"{absolute(RECORDER_NODE)}/status", self._on_status, profile("latched"))
-        self._events: list[dict[str, Any]] = []
+        self.events: list[dict[str, Any]] = []  # of the experiments, in their order
         self._node.create_subscription(String, topic("experiment"), self._on_experiment, profile("experiment"))
         self._leaving = False
         self._thread = threading.Thread(target=self._spin, daemon=True)
@@ -71,11 +71,7 @@ class GraphClient:
         self._status[status["output"]] = status
 
     def _on_experiment(self, message: String) -> None:
-        self._events.append(json.loads(message.data))
-
-    def events(self, since_ns: int) -> list[dict[str, Any]]:
-        """Events of the experiments that began after a time [ns], in their order."""
-        return [event for event in list(self._events) if event["started_ns"] >= since_ns]
+        self.events.append(json.loads(message.data))
 
     def recorder_status(self, folder: str) -> dict[str, Any]:
         """What the recorder has said last about a bag; empty before."""

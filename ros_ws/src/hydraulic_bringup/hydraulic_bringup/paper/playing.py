@@ -21,8 +21,6 @@ SENSORS = Sensors(
 )
 """Those of the simulator in the graph."""
 
-_SILENCE_S = 5.0  # a laptop that holds the plant up for a moment should not end a study of ten minutes
-
 
 def save(plans: Sequence[Plan], folder: Path) -> list[Experiment]:
     """Write the plans, each with its prediction, and name the experiments that play them."""
@@ -31,7 +29,7 @@ def save(plans: Sequence[Plan], folder: Path) -> list[Experiment]:
     for plan in plans:
         file = folder / f"{plan.name}.yaml"
         save_plan(plan, file)
-        experiments.append(Experiment(plan.name, file, _SILENCE_S))
+        experiments.append(Experiment(plan.name, file))
     return experiments
 
 
@@ -41,7 +39,7 @@ def through_the_graph(plans: Sequence[Plan], model: Path, plant: str, out: Path,
     :raises DemoError: a step failed.
     """
     bags = online.run(plant, model, save(plans, out / "plans"), out, steps)
-    return {plan.name: offline.read_bag(bag, steps)[0] for plan, bag in zip(plans, bags, strict=True)}
+    return {plan.name: offline.read_bag(bag, steps, 0.0)[0] for plan, bag in zip(plans, bags, strict=True)}
 
 
 def on_the_model(plans: Sequence[Plan], model: Model, steps: Steps) -> dict[str, Record]:

@@ -78,9 +78,10 @@ def main(argv: list[str] | None = None) -> int:
 def _demo(options: argparse.Namespace) -> None:
     if options.columns and not options.record:
         raise cli.UsageError("--columns: goes with --record only")
-    if options.record and (options.quick or options.plant):
-        raise cli.UsageError("--record: nothing is excited then, so --plant and --quick do not go with it")
+    if options.record and (options.quick or options.plant or options.lockstep is not None):
+        raise cli.UsageError("--record: nothing is excited then, so --plant, --quick and --lockstep do not go with it")
     options.plant = options.plant or "sim"
+    options.lockstep = options.lockstep is not False
     online.interrupt_on_sigterm()
     _run(options, Console(highlight=False))
 
@@ -97,6 +98,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--plant", choices=tuple(online.PLANTS), help="what is excited (default sim)")
     parser.add_argument("--out", metavar="DIR", type=Path, help="new folder of the run (default runs/<date>-demo)")
     parser.add_argument("--quick", action="store_true", help="experiments of a few seconds")
+    parser.add_argument(
+        "--lockstep",
+        action=argparse.BooleanOptionalAction,
+        help="the plant waits for its answers (default); without, it follows the wall clock",
+    )
     return parser
 
 
@@ -121,8 +127,8 @@ def _run(options: argparse.Namespace, console: Console) -> None:
         what = "a simulated actuator" + (" behind virtual CAN devices" if options.plant == "can" else "")
         console.print(f"exciting {what}, comparing it with {model.name}; results in {out}", soft_wrap=True)
         with ProgressSteps(console, 70.0 if kind == "full" else 35.0) as steps:
-            bags = online.run(options.plant, as_built, experiments, out, steps)
-            most = offline.MOST_MISSING_OVER_CAN if options.plant == "can" else offline.MOST_MISSING
+            bags = online.run(options.plant, as_built, experiments, out, steps, options.lockstep)
+            most = 0.0 if options.lockstep else offline.MOST_MISSING[options.plant]
             records, held_out = (offline.read_bag(bag, steps, most) for bag in bags)
             analysis = offline.analyse(records, held_out, model, out, steps)
     _print(analysis, console)

@@ -1,7 +1,7 @@
 """``virtual_bench``: the CAN devices of a bus file, simulated: servo valve, LVDT and transducers over a model's plant.
 
 The driver node cannot tell them from a bench: start them on the interface that it uses. Amplifier settings (``--set``)
-act on the spool, and faults (``--fault``) happen at a time. Ends with Ctrl-C.
+act on the spool, and faults (``--fault``) happen at a time of the devices. Ends with Ctrl-C.
 """
 
 from __future__ import annotations
@@ -12,20 +12,21 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from hydraulic_bringup.model_plant import ModelPlant
 from hydraulic_can_driver.bus import Bus
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_can_driver.virtual import VirtualBench
-from hydraulic_can_driver.virtual.faults import FAULTS, Fault
+from hydraulic_can_driver.virtual.faults import FAULTS, InjectedFault
 from hydraulic_can_driver.virtual.wiring import Event
 from hydraulic_node_utils import cli
 from hydraulic_plant_node.pacing import request_realtime
 from hydraulic_sim.model_file import load_model
 
 READY = "ready:"
+Timed = tuple[InjectedFault, float, float]
 _SHOWN = ("power", "nmt", "state", "emcy")
 _PRIORITY = 30  # above the driver's: devices do not wait for each other's programs
 _SWITCH_INTERVAL_S = 5e-5
@@ -58,43 +59,35 @@ def _serve(options: argparse.Namespace) -> int:
         options.pressure_noise,
         options.noise_seed,
     )
-    bench = VirtualBench(bus, None, plant)
+    bench = VirtualBench(bus, None, plant, options.lockstep)
     for text in options.set:
         _store(bench, text)
     return _run(bench, faults, options.model, leave)
 
 
-def _run(bench: VirtualBench, faults: list[tuple[Fault, float, float]], model: str, leave: threading.Event) -> int:
+def _run(bench: VirtualBench, faults: list[Timed], model: str, leave: threading.Event) -> int:
     bus = bench.bus
     bench.listeners.append(_show)
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
-    request_realtime(_PRIORITY)  # the bench's threads inherit it
+    if not bench.lockstep:
+        request_realtime(_PRIORITY)  # the bench's threads inherit it
     gc.collect()
     gc.freeze()
-    timers: list[threading.Timer] = []
     try:
         bench.start()
         devices = ", ".join(f"{name} 0x{node.id:02X}" for name, node in bus.nodes.items())
         print(f"{READY} {devices} of {bus.name} on {bus.interface} {bus.channel}, {bus.rate:g} Hz, {model}", flush=True)
         for fault, begin, end in faults:
-            timers += _timed(begin, lambda fault=fault: bench.inject(fault))  # type: ignore[misc]
-            timers += _timed(end, lambda fault=fault: bench.clear(fault)) if end > begin else []  # type: ignore[misc]
+            bench.after(begin, partial(bench.inject, fault))
+            if end > begin:
+                bench.after(end, partial(bench.clear, fault))
         while not leave.wait(0.2):
             if bench.error is not None:
                 print(f"virtual_bench: the plant failed: {bench.error}", file=sys.stderr)
                 return 1
     finally:
-        for timer in timers:
-            timer.cancel()
         bench.stop()
     return 0
-
-
-def _timed(seconds: float, action: Callable[[], None]) -> list[threading.Timer]:
-    timer = threading.Timer(seconds, action)
-    timer.daemon = True
-    timer.start()
-    return [timer]
 
 
 def _show(event: Event) -> None:
@@ -113,7 +106,7 @@ def _store(bench: VirtualBench, text: str) -> None:
     bench.devices[name].store(int(found["index"], 16), int(found["sub"] or 0), int(found["value"], 0))
 
 
-def _fault(text: str, bus: Bus) -> tuple[Fault, float, float]:
+def _fault(text: str, bus: Bus) -> Timed:
     """Fault, begin and end [s] of ``NAME:NODE@BEGIN[-END]``."""
     found = _FAULT.fullmatch(text)
     if found is None or found["name"] not in FAULTS:
@@ -140,6 +133,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--position-noise", type=float, default=0.0, metavar="M", help="standard deviation")
     add("--pressure-noise", type=float, default=0.0, metavar="PA", help="standard deviation, of each transducer")
     add("--noise-seed", type=int, default=0, metavar="N", help="of all noise")
+    add("--lockstep", action="store_true", help="time passes by SYNCs alone; for a driver that is in lockstep too")
     add("--set", action="append", default=[], metavar="[NODE:]INDEX[:SUB]=VALUE", help="setting stored in a device")
     add("--fault", action="append", default=[], metavar="NAME:NODE@BEGIN[-END]", help=f"of {', '.join(FAULTS)}")
     return parser

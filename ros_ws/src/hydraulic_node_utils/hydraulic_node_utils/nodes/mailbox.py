@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -34,10 +35,20 @@ class Mailbox:
     """
 
     def __init__(self, node: Node, kind: Any, name: str, qos: QoSProfile, raw: bool = False) -> None:
-        self._raw = raw
+        self._raw, self._context = raw, node.context
+        self._wait_set: Any = None
         self._subscription = node.create_subscription(
             kind, name, lambda message: None, qos, callback_group=_NotServed(), raw=raw
         )
+
+    def wait(self, seconds: float) -> None:
+        """Return when a message waits, or after that time."""
+        if self._wait_set is None:
+            self._wait_set = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, self._context.handle)
+        with self._subscription.handle:
+            self._wait_set.clear_entities()
+            self._wait_set.add_subscription(self._subscription.handle)
+            self._wait_set.wait(round(seconds * 1e9))
 
     def take(self) -> Iterator[Any]:
         """Every waiting message, oldest first."""

@@ -97,7 +97,8 @@ class PlantHealth:
             "overruns": report.overruns,
             "skipped": report.skipped,
             "wall_clock_step_s": f"{step:.4f}",
-            "scheduling": loop.scheduling,
+            "scheduling": loop.scheduling if loop.lockstep is None else "lockstep",
+            "unanswered": loop.lockstep.given_up if loop.lockstep else 0,
         }
         skipped = self._moved("skipped", report.skipped)
         overruns = self._moved("overruns", report.overruns)
@@ -105,6 +106,8 @@ class PlantHealth:
             return self._status("timing", ERROR, f"{skipped} sampling instants skipped", values)
         if lost := self._moved("lost", loop.lost):
             return self._status("timing", WARN, f"{lost} cycles without a sample", values)
+        if loop.lockstep and (given_up := self._moved("unanswered", loop.lockstep.given_up)):
+            return self._status("timing", WARN, f"{given_up} samples without an answer", values)
         if abs(step) > _CLOCK_STEP_S:
             message = f"wall clock was set by {step:.3f} s: re-activate to stamp with the new time"
             return self._status("timing", WARN, message, values)

@@ -41,6 +41,7 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("watchdog", WATCHDOG_S, "silence of the source until 0 V", "s", 0.002, 10.0, live=True),
     ParameterSpec("enable_on_activate", False, "obey commands from activation on, without `enable`"),
     ParameterSpec("autostart", False, "configure and activate at start"),
+    ParameterSpec("lockstep", False, "plant time waits for the answer to each state; publishes /clock"),
     ParameterSpec("realtime_priority", 20, "FIFO priority of the loop where permitted, 0: none", "", 0, 98),
 )
 
@@ -102,14 +103,16 @@ class PlantNode(LifecycleNode):
         self._error = ""
         try:
             values = self._table.values()
-            own_clock = values.get("publish_clock", False)
+            lockstep = values["lockstep"]
+            own_clock = lockstep or values.get("publish_clock", False)
             if self.get_parameter("use_sim_time").value and not own_clock:
                 raise ValueError("use_sim_time is true: a plant follows no other clock, it may only publish one")
             factor = values.get("real_time_factor", 1.0)
-            LoopTiming(1, factor, own_clock)  # refuses what contradicts itself before anything is loaded
+            LoopTiming(1, factor, own_clock, lockstep)  # refuses what contradicts itself before anything is loaded
             late = self._backend.configure(values)
             period_ns = round(1e9 / self._backend.sampling_rate(values))
-            self._timing = LoopTiming(period_ns, factor, own_clock, values["realtime_priority"])
+            priority = 0 if lockstep else values["realtime_priority"]  # nothing is gained by being in time
+            self._timing = LoopTiming(period_ns, factor, own_clock, lockstep, priority)
             self._late_parameters = [spec.name for spec in late]
             self._table.declare(late)
             for spec in late:
@@ -121,6 +124,8 @@ class PlantNode(LifecycleNode):
         if self._timing.own_clock:
             self._ports.open_clock()
             self.set_parameters([Parameter("use_sim_time", value=False)])
+        if self._timing.lockstep:
+            self._ports.follow_recorders()
         self._table.warn_of_unknown()
         self._ports.describe(self._backend.description())
         self._state = "inactive"

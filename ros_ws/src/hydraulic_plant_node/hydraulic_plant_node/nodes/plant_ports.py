@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, String
 
-from hydraulic_interfaces.contract import find_topic
+from hydraulic_interfaces.contract import RECORDER_NODE, absolute, find_topic
 from hydraulic_interfaces.conversions import (
     ClockEncoder,
     MessageError,
@@ -37,6 +37,8 @@ class PlantPorts:
         self._description = self._publisher(node, "description")
         self._limits: tuple[bool, bool] | None = None
         self._clock: Any = None
+        self._recorded: dict[str, int] = {}
+        self._recorders: Any = None
         self._node = node
         self._encode_state = StateEncoder()
         self._encode_pressure = PressureEncoder()
@@ -54,6 +56,26 @@ class PlantPorts:
                 gate.reject(str(error))
             else:
                 gate.accept(command, now_ns)
+
+    def wait_for_command(self, seconds: float) -> None:
+        """Return when a command waits, or after that time."""
+        self._commands.wait(seconds)
+
+    def commanders(self) -> int:
+        """How many publishers of commands there are."""
+        return self._commands.publishers
+
+    def recorded_ns(self) -> int | None:
+        """Stamp up to which every recorder that records has the samples; None where there is none."""
+        if self._recorders is None or not self._recorders.get_publisher_count():
+            self._recorded = {}
+        return min(self._recorded.values(), default=None)
+
+    def follow_recorders(self) -> None:
+        """Hear from now on how far recorders are."""
+        if self._recorders is None:
+            name = f"{absolute(RECORDER_NODE)}/status"
+            self._recorders = self._node.create_subscription(String, name, self._on_status, profile("latched"))
 
     def discard_commands(self) -> None:
         """Forget what came while nobody listened, and what the limit switches last said."""
@@ -87,6 +109,14 @@ class PlantPorts:
         """Send the time."""
         if self._clock is not None:
             self._clock.publish(self._encode_clock(stamp_ns))
+
+    def _on_status(self, message: String) -> None:
+        status = json.loads(message.data)
+        reached_ns = status.get("reached_ns")
+        if status["state"] == "recording" and reached_ns:
+            self._recorded = {**self._recorded, status["output"]: reached_ns}
+        else:
+            self._recorded = {name: at for name, at in self._recorded.items() if name != status["output"]}
 
     @staticmethod
     def _publisher(node: Node, name: str) -> Any:
