@@ -18,7 +18,6 @@ from hydraulic_control.trajectories import Limits, make
 from hydraulic_control.tuning import Criteria, figures_of, try_step
 from hydraulic_sim.model import Model
 
-REFERENCES = ("step", "staircase", "sine")
 ALIKE = 0.15
 """Identified and nonlinear model agree when a figure differs by no more than this part …"""
 RESOLVED = {"rise_time": 2e-3, "settling_time": 5e-3, "overshoot": 0.2}
@@ -29,7 +28,7 @@ _LIMITS = Limits(travel=10.0, velocity=10.0, acceleration=1e3)
 def respond(values: Mapping[str, Any], case: Case, kind: str, settings: Mapping[str, Any]) -> Response:
     """The response of a plant to a reference of that kind (`trajectories.make`)."""
     trajectory = make(kind, settings, _LIMITS)
-    return run(case.make(), Controller(values), trajectory.at, trajectory.duration)
+    return run(case.plant, Controller(values), trajectory.at, trajectory.duration)
 
 
 def settings_for(step: float) -> dict[str, dict[str, Any]]:

@@ -7,9 +7,7 @@ sec. 2.3). Between them, and above its Nyquist frequency, it knows nothing of th
 
 from __future__ import annotations
 
-import json
 import math
-from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from hydraulic_control.compiled_loop import linear
 from hydraulic_control.controller import Controller
 from hydraulic_control.errors import ControlError
+from hydraulic_node_utils.json_file import read_json
 
-NAN = float("nan")
 _APART = 1e-9
 _COMMON_NAMES = ("identify", "linear_model")  # all results are called so: their folder tells them apart
 
@@ -54,51 +52,13 @@ class IdentifiedModel:
         slowest = int(np.argmin(np.abs(self.poles)))
         return float(self.residues[slowest].real)
 
-    def plant(self) -> IdentifiedPlant:
-        """A plant at rest at 0 m."""
-        return IdentifiedPlant(self)
-
-
-class IdentifiedPlant:
-    """A running identified model; it has no chambers, so the force is not a number."""
-
-    def __init__(self, model: IdentifiedModel, drive_limit: float = 10.0) -> None:
-        self._model, self._limit = model, drive_limit
-        self._states = np.zeros(len(model.poles), dtype=complex)
-        self._dt = 0.0
-        self._late: deque[float] = deque()
-        self.true_position = 0.0
-
-    def step(self, drive: float, dt: float) -> tuple[float, float, float]:
-        """See `simulation.LoopPlant`."""
-        if dt != self._dt:
-            self._prepare(dt)
-        applied = min(max(drive, -self._limit), self._limit)
-        self._late.append(applied)
-        acting = self._late.popleft()
-        position = float((self._model.residues @ self._states).real) + self._model.direct * acting
-        self._states = self._turn * self._states + self._push * acting
-        self.true_position = position
-        return position, NAN, applied
-
     def close_loop(self, controller: Controller, wanted: NDArray, dt: float) -> tuple[NDArray, int]:
-        """See `simulation.LoopPlant`; always from rest at 0 m, compiled."""
-        self._prepare(dt)
-        out, model = np.empty((len(wanted), 2)), self._model
-        late = round(model.delay / dt)
-        done = linear(
-            self._turn, self._push.astype(complex), model.residues, model.direct, late,
-            *controller.records, dt, wanted, out,
-        )  # fmt: skip
-        return out, int(done)
-
-    def _prepare(self, dt: float) -> None:
-        p = self._model.poles
-        self._turn = np.exp(p * dt)
-        fast = np.abs(p) * dt > _APART
-        self._push = np.where(fast, (self._turn - 1.0) / np.where(fast, p, 1.0), dt)
-        self._late = deque([0.0] * round(self._model.delay / dt))
-        self._dt = dt
+        """See `simulation.LoopPlant`; from rest at 0 m, compiled. It has no chambers: the force is not a number."""
+        turn = np.exp(self.poles * dt)
+        fast = np.abs(self.poles) * dt > _APART
+        push = np.where(fast, (turn - 1.0) / np.where(fast, self.poles, 1.0), dt).astype(complex)
+        out, late = np.empty((len(wanted), 2)), round(self.delay / dt)
+        return out, linear(turn, push, self.residues, self.direct, late, *controller.records, dt, wanted, out)
 
 
 def from_coefficients(
@@ -148,14 +108,8 @@ def load_identified(path: Path | str) -> IdentifiedModel:
     """
     file = Path(path)
     try:
-        document: Any = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ControlError(f"{file}: cannot be read ({error.strerror})") from None
-    except ValueError as error:
-        raise ControlError(f"{file}: not a JSON document ({error})") from None
-    try:
+        document = form = read_json(file, ControlError)
         _check_units(file, document)
-        form = document
         for key in ("model", "transfer_function"):
             form = form.get(key, form)
         continuous = form.get("domain", "discrete") == "continuous"

@@ -82,17 +82,16 @@ def step_figures(response: Response) -> StepFigures:
     part = (x - start) / (goal - start)
     t = t - t[0]
     tail = x[-max(len(x) // 10, 1) :]
-    error = goal - x
-    dt = float(np.median(np.diff(t)))
+    whole = tracking_figures(Response(t, np.full_like(t, goal), x, u))
     return StepFigures(
         rise_time=_reached(t, part, 0.9) - _reached(t, part, 0.1),
         settling_time=_settled(t, part),
         overshoot=100.0 * max(float(part.max()) - 1.0, 0.0),
         steady_state_error=float(abs(goal - tail.mean())),
-        rms_error=float(np.sqrt(np.mean(error**2))),
-        ise=float(np.sum(error**2) * dt),
-        effort=float(np.sqrt(np.mean(u**2))),
-        activity=float(np.mean(np.abs(np.diff(u))) / dt),
+        rms_error=whole.rms_error,
+        ise=float(np.sum((goal - x) ** 2) * np.median(np.diff(t))),
+        effort=whole.effort,
+        activity=whole.activity,
     )
 
 

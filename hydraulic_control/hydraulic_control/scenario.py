@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,16 +29,16 @@ BIAS = 0.005
 
 @dataclass(frozen=True)
 class Case:
-    """A plant to try gains on: a name, what makes a fresh one at rest, and whether it is an identified model."""
+    """A plant to try gains on: its name, the plant at rest, and whether it is an identified model."""
 
     name: str
-    make: Callable[[], LoopPlant]
+    plant: LoopPlant
     identified: bool = False
 
 
 def nominal(model: Model, noise: SensorNoise) -> Case:
     """The model as it is."""
-    return Case(model.name, lambda: SimulatedPlant(model, noise))
+    return Case(model.name, SimulatedPlant(model, noise))
 
 
 def scattered(model: Model, count: int, seed: int, noise: SensorNoise) -> list[Case]:
@@ -48,13 +48,9 @@ def scattered(model: Model, count: int, seed: int, noise: SensorNoise) -> list[C
     offsets = np.random.default_rng(seed + 1).normal(0.0, BIAS, count)
     if model.kind == "hydraulic":
         copies = [m.with_effect("valve_null_bias", {"bias": float(b)}) for m, b in zip(copies, offsets, strict=True)]
-    return [Case(f"scattered {i + 1}", _maker(m, noise, seed + i)) for i, m in enumerate(copies)]
+    return [Case(f"scattered {i + 1}", SimulatedPlant(m, noise, seed + i)) for i, m in enumerate(copies)]
 
 
 def identified(models: Sequence[IdentifiedModel]) -> list[Case]:
     """The identified models."""
-    return [Case(f"identified {m.name}", m.plant, True) for m in models]
-
-
-def _maker(model: Model, noise: SensorNoise, seed: int) -> Callable[[], LoopPlant]:
-    return lambda: SimulatedPlant(model, noise, seed)
+    return [Case(f"identified {m.name}", m, True) for m in models]

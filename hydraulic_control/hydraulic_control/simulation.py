@@ -24,15 +24,10 @@ Reference = Callable[[float], tuple[float, float]]
 
 
 class LoopPlant(Protocol):
-    """What a loop needs of a plant; ``true_position`` [m] is the one at the last sample, without the sensor's noise."""
-
-    true_position: float
-
-    def step(self, drive: float, dt: float) -> tuple[float, float, float]:
-        """Position [m], force from the pressures [N] and applied drive [V] now; then advance with that drive [V]."""
+    """What a loop can be closed around."""
 
     def close_loop(self, controller: Controller, wanted: Array, dt: float) -> tuple[Array, int]:
-        """From the present state in a loop with ``controller``: (N, 2) true position [m] and applied drive [V] for
+        """From its start in a loop with ``controller``: (N, 2) true position [m] and applied drive [V] for
         ``wanted`` (N, 2), reference [m] and its velocity [m/s]; and how many samples could be followed."""
 
 
@@ -56,27 +51,29 @@ class SimulatedPlant:
         self._start = self._plant.initial_state(position=position)
         self._live = LivePlant(self._plant, self._start)
         self._areas = np.array([self._plant.value("piston_area_a"), self._plant.value("piston_area_b")])
-        self._generator, self._resolution = np.random.default_rng(seed), noise.resolution
+        self._seed, self._resolution = seed, noise.resolution
+        self._generator = np.random.default_rng(seed)
         self._scale = np.array([noise.position, noise.pressure * float(np.hypot(*self._areas))])
-        self.true_position = position
 
     def step(self, drive: float, dt: float) -> tuple[float, float, float]:
-        """See `LoopPlant`. Raises `SimulationError` where the physics cannot be followed."""
+        """Position [m], force from the pressures [N] and applied drive [V] now; then advance with ``drive`` [V].
+
+        :raises SimulationError: the physics cannot be followed.
+        """
         now = self._live.step(drive, dt)
         of_position, of_force = self._scale * self._generator.standard_normal(2)
-        self.true_position, position = now.position, now.position + of_position
+        position = now.position + of_position
         if self._resolution > 0.0:
             position = round(position / self._resolution) * self._resolution
         return position, now.force + of_force, now.drive
 
     def close_loop(self, controller: Controller, wanted: Array, dt: float) -> tuple[Array, int]:
-        """See `LoopPlant`; always from where the plant was made, compiled."""
-        pieces = self._plant.embedded()
-        noise = self._scale * self._generator.standard_normal((len(wanted), 2))
+        """See `LoopPlant`; compiled, always from where the plant was made and with the same noise."""
+        noise = self._scale * np.random.default_rng(self._seed).standard_normal((len(wanted), 2))
         out = np.full((len(wanted), 2), np.nan)
         done = physical(
-            *pieces, self._start.states.copy(), self._start.memory.copy(), self._areas, self._resolution,
-            *controller.records, dt, wanted, noise, out,
+            *self._plant.embedded(), self._start.states.copy(), self._start.memory.copy(), self._areas,
+            self._resolution, *controller.records, dt, wanted, noise, out,
         )  # fmt: skip
         return out, int(done)
 

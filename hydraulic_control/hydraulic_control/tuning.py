@@ -93,8 +93,7 @@ class Tuned:
 
 def try_step(values: Mapping[str, Any], case: Case, step: float, duration: float) -> Response:
     """The response to a step of ``step`` [m], which comes after a second of rest."""
-    controller = Controller(values)
-    return run(case.make(), controller, step_reference(step, at=_BEGIN_S), duration + _BEGIN_S)
+    return run(case.plant, Controller(values), step_reference(step, at=_BEGIN_S), duration + _BEGIN_S)
 
 
 def figures_of(response: Response) -> StepFigures | None:

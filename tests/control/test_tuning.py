@@ -30,7 +30,7 @@ class Oscillator:
     """K·ω³/((s + ω)³) integrated finely: its critical point is the same at every amplitude."""
 
     def __init__(self, gain: float = 0.01, omega: float = 20.0) -> None:
-        self.gain, self.omega, self.x, self.true_position = gain, omega, np.zeros(3), 0.0
+        self.gain, self.omega, self.x = gain, omega, np.zeros(3)
 
     def step(self, drive: float, dt: float) -> tuple[float, float, float]:
         out = float(self.x[2])

@@ -5,7 +5,7 @@ A new kind is one more file and one more row in `KINDS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from hydraulic_control.errors import ControlError
@@ -20,14 +20,14 @@ from .step import Step
 from .trapezoid import Trapezoid
 from .triangle import Triangle
 
-KINDS: dict[str, Callable[[Mapping[str, Any], Limits], Trajectory]] = {
-    "step": Step.from_settings,
-    "staircase": Staircase.from_settings,
-    "sine": Sine.from_settings,
-    "triangle": Triangle.from_settings,
-    "trapezoid": Trapezoid.from_settings,
-    "minimum_jerk": MinimumJerk.from_settings,
-    "playback": Playback.from_settings,
+KINDS: dict[str, Any] = {
+    "step": Step,
+    "staircase": Staircase,
+    "sine": Sine,
+    "triangle": Triangle,
+    "trapezoid": Trapezoid,
+    "minimum_jerk": MinimumJerk,
+    "playback": Playback,
 }
 
 
@@ -39,7 +39,7 @@ def make(kind: str, settings: Mapping[str, Any], limits: Limits) -> Trajectory:
     """
     if kind not in KINDS:
         raise ControlError(f"reference kind is {kind!r}; allowed are {', '.join(KINDS)}")
-    trajectory = KINDS[kind](settings, limits)
+    trajectory: Trajectory = KINDS[kind].from_settings(settings, limits)
     check(kind, trajectory, limits)
     return trajectory
 

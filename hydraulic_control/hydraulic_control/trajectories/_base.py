@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -36,6 +37,21 @@ class Trajectory(Protocol):
 
     def at(self, t: float) -> tuple[float, float]:
         """Position [m] and velocity [m/s] at ``t`` [s]."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A trajectory by formula; its numbers are its fields."""
+
+    offset: float
+    amplitude: float
+    jumps: ClassVar[bool] = False
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Trajectory:
+        """See `make`; a field that is no setting is a limit."""
+        known = {**vars(limits), **settings}
+        return cls(**{f.name: known[f.name] for f in fields(cls)})  # type: ignore[return-value]
 
 
 def check(name: str, trajectory: Trajectory, limits: Limits) -> None:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
-from ._base import Limits
+from ._base import Limits, Profile
 
 PEAK_VELOCITY = 15.0 / 8.0
 PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
@@ -30,15 +30,12 @@ def shortest_time(distance: float, limits: Limits) -> float:
 
 
 @dataclass(frozen=True)
-class MinimumJerk:
+class MinimumJerk(Profile):
     """From ``offset`` [m] by ``amplitude`` [m] in ``time`` [s], ``dwell`` [s] of rest, and back (if ``back``)."""
 
-    offset: float
-    amplitude: float
     time: float
     dwell: float = 0.0
     back: bool = True
-    jumps: ClassVar[bool] = False
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> MinimumJerk:

@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from ._base import Limits
+from ._base import Profile
 from .minimum_jerk import blend
 
 
 @dataclass(frozen=True)
-class Sine:
+class Sine(Profile):
     """``amplitude`` [m] around ``offset`` [m] at ``frequency`` [Hz] for ``cycles``; it swells and fades over one more
     cycle each, so that it begins and ends at rest."""
 
-    offset: float
-    amplitude: float
     frequency: float
     cycles: int
-    jumps: ClassVar[bool] = False
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Sine:
-        """See `make`."""
-        return cls(settings["offset"], settings["amplitude"], settings["frequency"], settings["cycles"])
 
     @property
     def duration(self) -> float:

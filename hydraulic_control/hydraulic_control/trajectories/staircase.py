@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from ._base import Limits
+from ._base import Profile
 
 
 @dataclass(frozen=True)
-class Staircase:
+class Staircase(Profile):
     """From ``offset`` [m] up to ``amplitude`` [m] in ``levels`` equal steps and down again, ``dwell`` [s] on each."""
 
-    offset: float
-    amplitude: float
     levels: int
     dwell: float
     jumps: ClassVar[bool] = True
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Staircase:
-        """See `make`."""
-        return cls(settings["offset"], settings["amplitude"], settings["levels"], settings["dwell"])
 
     @property
     def duration(self) -> float:

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from ._base import Limits
+from ._base import Profile
 
 
 @dataclass(frozen=True)
-class Step:
+class Step(Profile):
     """From ``offset`` [m] by ``amplitude`` [m] at half the ``dwell`` [s], which then follows once more."""
 
-    offset: float
-    amplitude: float
     dwell: float
     jumps: ClassVar[bool] = True
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Step:
-        """See `make`."""
-        return cls(settings["offset"], settings["amplitude"], settings["dwell"])
 
     @property
     def duration(self) -> float:

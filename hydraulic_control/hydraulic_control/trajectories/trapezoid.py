@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from ._base import Limits
+from ._base import Profile
 
 
 @dataclass(frozen=True)
-class Trapezoid:
+class Trapezoid(Profile):
     """From ``offset`` [m] by ``amplitude`` [m] at the limits of ``velocity`` [m/s] and ``acceleration`` [m/s²],
     ``dwell`` [s] of rest, and back. A way too short for full speed has a triangular profile."""
 
-    offset: float
-    amplitude: float
     velocity: float
     acceleration: float
     dwell: float
-    jumps: ClassVar[bool] = False
-
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Trapezoid:
-        """See `make`."""
-        return cls(settings["offset"], settings["amplitude"], limits.velocity, limits.acceleration, settings["dwell"])
 
     @property
     def _way(self) -> tuple[float, float]:

@@ -3,40 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 from hydraulic_control.errors import ControlError
 
-from ._base import Limits
+from ._base import Profile
 
 
 @dataclass(frozen=True)
-class Triangle:
+class Triangle(Profile):
     """``amplitude`` [m] around ``offset`` [m] at ``frequency`` [Hz] for ``cycles``: constant speed between corners of
-    constant ``acceleration`` [m/s²]. It begins and ends at rest, at ``offset − amplitude``."""
+    constant ``acceleration`` [m/s²]. It begins and ends at rest, at ``offset − amplitude``.
 
-    offset: float
-    amplitude: float
+    :raises ControlError: the acceleration cannot turn it round in time.
+    """
+
     frequency: float
     cycles: int
     acceleration: float
-    jumps: ClassVar[bool] = False
 
-    @classmethod
-    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Triangle:
-        """See `make`. Raises `ControlError` where the acceleration cannot turn it round in time."""
-        made = cls(
-            settings["offset"], settings["amplitude"], settings["frequency"], settings["cycles"], limits.acceleration
-        )
-        if 16.0 * abs(made.amplitude) * made.frequency**2 > limits.acceleration / 2.0:
-            needed = 32.0 * abs(made.amplitude) * made.frequency**2
+    def __post_init__(self) -> None:
+        needed = 32.0 * abs(self.amplitude) * self.frequency**2
+        if needed > self.acceleration:
             raise ControlError(
-                f"triangle: {made.amplitude:g} m at {made.frequency:g} Hz needs {needed:.4g} m/s²; allowed are "
-                f"{limits.acceleration:.4g} m/s²"
+                f"triangle: {self.amplitude:g} m at {self.frequency:g} Hz needs {needed:.4g} m/s²; allowed are "
+                f"{self.acceleration:.4g} m/s²"
             )
-        return made
 
     @property
     def _corner(self) -> tuple[float, float]:

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from hydraulic_control import evaluation, gains_file, paper
 from hydraulic_control.errors import ControlError
@@ -23,7 +22,9 @@ from hydraulic_control.response import Response
 from hydraulic_control.simulation import QUIET, SensorNoise
 from hydraulic_control.trajectories import KINDS
 from hydraulic_control.tuning import Criteria
+from hydraulic_control.verbs._cells import STEP_COLUMNS, step_cells
 from hydraulic_node_utils import cli, tables
+from hydraulic_node_utils.json_file import read_json
 from hydraulic_sim.model_file import load_model
 
 EPILOG = """\
@@ -75,38 +76,33 @@ def _evaluate(options: argparse.Namespace) -> None:
         return
     console = tables.console(120)
     for name, result in results.items():
-        _print_steps(console, name, result, options.step)
-        _print_tracking(console, name, result)
+        _show_steps(console, name, result, options.step)
+        _show_tracking(console, name, result)
     if options.scatter:
-        _print_scatter(console, results, options.scatter)
+        _show_scatter(console, results, options.scatter)
 
 
 def _bench(path: Path) -> tuple[str, Response]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ControlError(f"{path}: not a JSON document ({error})") from None
+    document = read_json(path, ControlError)
     kind = document.get("kind") if isinstance(document, dict) else None
     if kind not in KINDS:
         raise ControlError(f"{path}: kind is {kind!r}; allowed are {', '.join(KINDS)}")
     response = Response.from_document(document)
     lost, longest = response.gaps()
     if lost > _TOLD:
-        text = (
-            f"{path}: {lost:.0%} of the states were not heard, for up to {1e3 * longest:.0f} ms: its figures are those"
-        )
-        print(f"{text} of a machine that did not keep up", file=sys.stderr)
+        text = f"{path}: {lost:.0%} of the states were not heard, for up to {1e3 * longest:.0f} ms: its figures are"
+        print(f"{text} those of a machine that did not keep up", file=sys.stderr)
     return kind, response
 
 
-def _print_steps(console: Console, name: str, result: dict[str, Any], step: float) -> None:
-    table = Table(title=f"{name}: step of {1e3 * step:g} mm", title_justify="left")
-    for title in ("plant", "Tr s", "Ts s", "OS %", "error µm", "effort V", "paper Tr / Ts / OS"):
-        table.add_column(title, justify="left" if title == "plant" else "right", no_wrap=True)
+def _show_steps(console: Console, name: str, result: dict[str, Any], step: float) -> None:
+    columns = ("|plant", *STEP_COLUMNS, ">|effort V", ">|paper Tr / Ts / OS")
+    table = tables.table(f"{name}: step of {1e3 * step:g} mm", columns)
     for row in result["rows"]:
-        if row["reference"] != "step":
-            continue
-        table.add_row(row["where"], *_step_cells(row), _paper(row["where"], result))
+        if row["reference"] == "step":
+            lost = row["runs_away"]
+            cells = step_cells(None if lost else row)
+            table.add_row(row["where"], *cells, "" if lost else f"{row['effort']:.2f}", _paper(row["where"], result))
     console.print(table)
     for agreement in result["agreement"]:
         printed = paper.beside(agreement["identified"])
@@ -132,22 +128,9 @@ def _triple(printed: paper.PaperStep) -> str:
     return " / ".join(f"{value:g}" for value in printed)
 
 
-def _step_cells(row: dict[str, Any]) -> list[str]:
-    if row["runs_away"]:
-        return ["runs away", *[""] * 4]
-    return [
-        f"{row['rise_time']:.3f}",
-        f"{row['settling_time']:.3f}",
-        f"{row['overshoot']:.2f}",
-        f"{1e6 * row['steady_state_error']:.1f}",
-        f"{row['effort']:.2f}",
-    ]
-
-
-def _print_tracking(console: Console, name: str, result: dict[str, Any]) -> None:
-    table = Table(title=f"{name}: tracking", title_justify="left")
-    for title in ("plant", "reference", "RMS error mm", "largest error mm", "effort V", "drive's speed V/s"):
-        table.add_column(title, justify="left" if title in ("plant", "reference") else "right", no_wrap=True)
+def _show_tracking(console: Console, name: str, result: dict[str, Any]) -> None:
+    columns = ("|plant", "|reference", ">|RMS error mm", ">|largest error mm", ">|effort V", ">|drive's speed V/s")
+    table = tables.table(f"{name}: tracking", columns)
     for row in result["rows"]:
         cells = ["runs away", "", "", ""]
         if not row["runs_away"]:
@@ -157,19 +140,15 @@ def _print_tracking(console: Console, name: str, result: dict[str, Any]) -> None
     console.print(table)
 
 
-def _print_scatter(console: Console, results: dict[str, Any], count: int) -> None:
-    table = Table(title=f"the same step on {count} scattered plants", title_justify="left")
-    for title in ("gains", "", "Tr s", "Ts s", "OS %", "error µm", "drive's speed V/s", "cost", "unsettled"):
-        table.add_column(title, justify="left" if title in ("gains", "") else "right", no_wrap=True)
+def _show_scatter(console: Console, results: dict[str, Any], count: int) -> None:
+    columns = ("|gains", "|", *STEP_COLUMNS, ">|drive's speed V/s", ">|cost", ">|unsettled")
+    table = tables.table(f"the same step on {count} scattered plants", columns)
     for name, result in results.items():
         found = result["scatter"]
         for which in ("median", "worst"):
-            f = found[which]
             lost = f"{found['unsettled'] + found['ran_away']}" if which == "worst" else ""
-            if f:
-                cells = [f"{f['rise_time']:.3f}", f"{f['settling_time']:.3f}", f"{f['overshoot']:.2f}"]
-                cells += [f"{1e6 * f['steady_state_error']:.1f}", f"{f['activity']:.1f}", f"{f['cost']:.3f}"]
-                table.add_row(name, which, *cells, lost)
+            if f := found[which]:
+                table.add_row(name, which, *step_cells(f), f"{f['activity']:.1f}", f"{f['cost']:.3f}", lost)
     console.print(table)
 
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from hydraulic_control import gains_file, tune_run
 from hydraulic_control.errors import ControlError
@@ -25,7 +25,9 @@ from hydraulic_control.relay import CriticalPoint, RelaySettings
 from hydraulic_control.scenario import nominal, scattered
 from hydraulic_control.simulation import SensorNoise
 from hydraulic_control.tuning import Criteria, Tuned, figures_of, try_step
+from hydraulic_control.verbs._cells import STEP_COLUMNS, step_cells
 from hydraulic_node_utils import cli, tables
+from hydraulic_node_utils.json_file import read_json
 from hydraulic_sim.model_file import load_model
 
 EPILOG = """\
@@ -80,15 +82,15 @@ def _tune(options: argparse.Namespace) -> None:
         print(json.dumps(_document(found, gains, tuned), ensure_ascii=False))
         return
     out = tables.console(120)
-    _print_points(out, found)
-    _print_rules(out, gains)
-    _print_tuned(out, options, model, tuned, noise)
+    _show_points(out, found)
+    _show_rules(out, gains)
+    _show_tuned(out, options, model, tuned, noise)
     out.print(f"\n{path}")
 
 
 def _measured(path: Path) -> CriticalPoint:
+    document = read_json(path, ControlError)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
         return CriticalPoint(float(document["critical_gain"]), float(document["critical_period"]))
     except (ValueError, KeyError, TypeError):
         raise ControlError(f"{path}: needs numbers for critical_gain and critical_period") from None
@@ -105,38 +107,29 @@ def _remarks(options: argparse.Namespace, tuned: Tuned) -> str:
     )
 
 
-def _print_points(out: Console, found: list[tune_run.Found]) -> None:
-    table = Table(title="critical point of a proportional loop", title_justify="left")
-    for title in ("from", "gain V/m", "period ms", ""):
-        table.add_column(title, justify="left" if title in ("from", "") else "right")
+def _show_points(out: Console, found: list[tune_run.Found]) -> None:
+    rows = []
     for one in found:
-        cells = ["–", "–"] if one.point is None else [f"{one.point.gain:.4g}", f"{1e3 * one.point.period:.4g}"]
-        table.add_row(one.source, *cells, one.remark)
-    out.print(table)
+        cells = ("–", "–") if one.point is None else (f"{one.point.gain:.4g}", f"{1e3 * one.point.period:.4g}")
+        rows.append((one.source, *cells, one.remark))
+    columns = ("from", ">gain V/m", ">period ms", "")
+    out.print(tables.table("critical point of a proportional loop", columns, rows))
 
 
-def _print_rules(out: Console, gains: dict[str, Any]) -> None:
-    table = Table(title="gains by rule", title_justify="left")
-    for title in ("rule", "Kp V/m", "Ki V/(m·s)", "Kd V·s/m"):
-        table.add_column(title, justify="left" if title == "rule" else "right")
-    for name, g in gains.items():
-        table.add_row(name, f"{g.kp:.4g}", f"{g.ki:.4g}", f"{g.kd:.4g}")
-    out.print(table)
+def _show_rules(out: Console, gains: dict[str, Any]) -> None:
+    rows = [(name, f"{g.kp:.4g}", f"{g.ki:.4g}", f"{g.kd:.4g}") for name, g in gains.items()]
+    out.print(tables.table("gains by rule", ("rule", ">Kp V/m", ">Ki V/(m·s)", ">Kd V·s/m"), rows))
 
 
-def _print_tuned(out: Console, options: argparse.Namespace, model: Any, tuned: Tuned, noise: SensorNoise) -> None:
+def _show_tuned(out: Console, options: argparse.Namespace, model: Any, tuned: Tuned, noise: SensorNoise) -> None:
     values = ", ".join(f"{n} {v:.4g}" for n, v in tuned.values.items() if isinstance(v, float))
     out.print(f"{options.controller}: {values}")
     out.print(f"cost {tuned.cost:.4g} (best rule {tuned.start_cost:.4g}) after {tuned.trials} trials")
-    table = Table(title="steps with these values", title_justify="left")
-    for title in ("plant", "step mm", "Tr s", "Ts s", "OS %", "error µm"):
-        table.add_column(title, justify="left" if title == "plant" else "right")
+    table = tables.table("steps with these values", ("plant", ">step mm", *STEP_COLUMNS))
     for case in [nominal(model, noise), *scattered(model, options.plants, tune_run.SEED, noise)]:
         for step in options.steps:
-            f = figures_of(try_step(tuned.values, case, step, 2.0))
-            cells = ["runs away", "", "", ""] if f is None else [f"{f.rise_time:.3f}", f"{f.settling_time:.3f}"]
-            cells += [] if f is None else [f"{f.overshoot:.2f}", f"{1e6 * f.steady_state_error:.1f}"]
-            table.add_row(case.name, f"{1e3 * step:g}", *cells)
+            figures = figures_of(try_step(tuned.values, case, step, 2.0))
+            table.add_row(case.name, f"{1e3 * step:g}", *step_cells(None if figures is None else asdict(figures)))
     out.print(table)
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from hydraulic_interfaces.errors import HydraulicError
+from hydraulic_node_utils.json_file import read_json
 
 FAMILY = "hydraulic_sysid."
 PAGE = "report.html"
@@ -134,12 +135,7 @@ def read_result(path: Path) -> dict[str, Any]:
 
     :raises ResultError: not there, not JSON, or without this family's schema.
     """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise ResultError(f"{path}: not a JSON document ({error})") from error
+    document = read_json(path, ResultError)
     schema = document.get("schema") if isinstance(document, dict) else None
     if not isinstance(schema, str) or not schema.startswith(FAMILY):
         raise ResultError(f"{path}: schema is {schema!r}, expected {FAMILY}<verb>/<version>")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hydraulic_node_utils.json_file import read_json
 from hydraulic_sysid.data.results import write_text
 
 from .arx import ArxModel, ArxOrder
@@ -86,12 +87,7 @@ def read_document(path: Path) -> dict[str, Any]:
 
     :raises IdentificationError: no file, or not of this format.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise IdentificationError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise IdentificationError(f"{path}: not a JSON document ({error})") from error
+    content = read_json(path, IdentificationError)
     found = content.get("format") if isinstance(content, dict) else None
     if found not in _READABLE:
         raise IdentificationError(f"{path}: format is {found!r}, expected {FORMAT!r}")
