@@ -22,7 +22,8 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.calibrate import CalibrationError, Settings, calibrate
 from hydraulic_sysid.estimation.noise import noise_floor, robust_noise_floor
-from hydraulic_sysid.report import calibrate_figures, render
+from hydraulic_sysid.report import render
+from hydraulic_sysid.report.calibrate import figures as calibrate_figures
 from hydraulic_sysid.verbs import calibrate as verb
 
 Array = NDArray[np.float64]

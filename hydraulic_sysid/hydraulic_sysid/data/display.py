@@ -37,6 +37,21 @@ TITLES = {
 }
 """Channel or variable → words."""
 
+UNITS = {
+    "position": "m",
+    "reading": "m",
+    "velocity": "m/s",
+    "speed": "m/s",
+    "pressure_a": "Pa",
+    "pressure_b": "Pa",
+    "load_pressure": "Pa",
+    "size_of_load_pressure": "Pa",
+    "mean_pressure": "Pa",
+    "drive": "V",
+    "time": "s",
+}
+"""Channel or variable → SI unit; what is not here is a pure number."""
+
 MODES = {"free_run": "Free run", "horizon": "Horizon", "one_step": "One step"}
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
@@ -16,24 +19,7 @@ from plotly.offline import get_plotlyjs
 from hydraulic_sysid.data import display
 from hydraulic_sysid.data.results import PAGE, PAGE_MARK, ResultError, verb_of, write_text
 
-from . import (
-    calibrate_section,
-    diagnose_section,
-    locate_section,
-    next_experiment_section,
-)
-from .html import Figures
-
 Result = dict[str, Any]
-
-# Sections that are not templates yet.
-SECTIONS: dict[str, Callable[[Result, Figures], str]] = {
-    "hydraulic_sysid.add/2": diagnose_section.html,
-    "hydraulic_sysid.calibrate/2": calibrate_section.html,
-    "hydraulic_sysid.diagnose/2": diagnose_section.html,
-    "hydraulic_sysid.locate/2": locate_section.html,
-    "hydraulic_sysid.next_experiment/2": next_experiment_section.html,
-}
 
 
 def _whole(shown: Callable[..., str]) -> Callable[..., str]:
@@ -55,6 +41,19 @@ FILTERS: dict[str, Callable[..., Any]] = {
 """How templates show numbers and names."""
 
 
+@dataclass
+class Figures:
+    """The figures of a page: given a place each, and written once, to be drawn when they come into view."""
+
+    known: dict[str, go.Figure] = field(default_factory=dict)
+
+    def add(self, figure: go.Figure) -> str:
+        """The name under which the page holds the figure."""
+        name = f"figure-{len(self.known) + 1}"
+        self.known[name] = figure
+        return name
+
+
 def render(results: Sequence[Result]) -> str:
     """HTML of one page for the results, in the order given. It needs no other file and no network.
 
@@ -62,21 +61,15 @@ def render(results: Sequence[Result]) -> str:
     """
     if not results:
         raise ResultError("there is no result to show")
-    place, known = Figures(), _kinds()
-    parts: list[tuple[Result, str, ModuleType | None, Markup | None]] = []
+    kinds, parts = _kinds(), []
     for result in results:
-        schema = result["schema"]
-        if schema in known:
-            parts.append((result, f"{known[schema]}/section.html.j2", _module(f"{known[schema]}.figures"), None))
-        elif schema in SECTIONS:
-            parts.append((result, "", None, Markup(SECTIONS[schema](result, place))))
-        else:
-            shown = ", ".join(sorted([*known, *SECTIONS]))
-            raise ResultError(f"schema {schema!r} cannot be shown; known are {shown}")
+        if result["schema"] not in kinds:
+            raise ResultError(f"schema {result['schema']!r} cannot be shown; known are {', '.join(sorted(kinds))}")
+        folder = kinds[result["schema"]]
+        figures = _module(f"{folder}.figures")
+        parts.append({"result": result, "template": f"{folder}/section.html.j2", "figures": figures})
     page = _environment().get_template("page.html.j2")
-    return page.render(
-        title=_title(results), parts=parts, place=place, mark=Markup(PAGE_MARK), plotly=Markup(get_plotlyjs())
-    )
+    return page.render(parts=parts, place=Figures(), mark=Markup(PAGE_MARK), plotly=Markup(get_plotlyjs()))
 
 
 def write_page(folder: Path, results: Sequence[Result]) -> Path:
@@ -86,16 +79,18 @@ def write_page(folder: Path, results: Sequence[Result]) -> Path:
     return path
 
 
+def _module(name: str) -> ModuleType:
+    return import_module(f".{name}", __package__)
+
+
+@cache
 def _kinds() -> dict[str, str]:
     """Schema → folder that shows such a result."""
     folders = [template.parent.name for template in Path(__file__).parent.glob("*/section.html.j2")]
     return {_module(folder).SCHEMA: folder for folder in folders}
 
 
-def _module(name: str) -> ModuleType:
-    return import_module(f".{name}", __package__)
-
-
+@cache
 def _environment() -> Environment:
     """Templates in which every value is escaped, and a name that is not there is an error."""
     made = Environment(
@@ -106,15 +101,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     made.filters |= FILTERS
+    made.globals["units"] = display.UNITS
     # The filter tojson escapes what could end the script element in which it stands.
     made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json()
     return made
-
-
-def _title(results: Sequence[Result]) -> str:
-    for result in results:
-        if "title" in result:
-            return str(result["title"])
-        if "name" in result["model"]:
-            return f"{result['model']['name']} against measurements"
-    return "Identified model"

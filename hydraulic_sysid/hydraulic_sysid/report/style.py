@@ -26,6 +26,7 @@ MORE = ("#b07cc6", "#c9a227")
 """For a fourth and a fifth curve."""
 FAINT = "rgba(128,138,150,0.10)"
 FLOOR_BAND = "rgba(139,147,161,0.25)"
+_TALL = 30.0  # residual over noise from which a bar at 1 cannot be seen any more
 TITLED = {"l": 66, "r": 14, "t": 52, "b": 44}
 """Margins of a figure whose panels have titles, below the tool bar."""
 _GRID = "rgba(128,138,150,0.22)"
@@ -98,6 +99,28 @@ class Panels:
         x, y = values(trace["time"]), values(trace["value"], factor)
         line = {"color": colour, "width": width, **more.pop("line", {})}
         self.line(panel, x, y, name, legend, line=line, hovertemplate="%{y:.4g}", **more)
+
+    def bars(self, panel: int, names: Any, heights: Any, name: str, colour: Any, numbers: list[str] | None = None,
+             legend: bool = False) -> None:  # fmt: skip
+        """Upright bars over names, with numbers above them."""
+        self.line(
+            panel, np.array(names), values(heights), name, legend, type="bar", marker={"color": colour}, text=numbers,
+            textposition="outside", textangle=0, cliponaxis=False, hovertemplate="%{x}: %{y:.4g}",
+        )  # fmt: skip
+
+    def over_noise(self, panel: int, heights: list[float], title: str = "× noise") -> None:
+        """An axis for residuals over noise, with a dotted line at the noise and room for numbers above the bars.
+
+        It begins at zero while a residual at the noise can be seen there, and is logarithmic otherwise.
+        """
+        self.limit(panel, y=1.0, colour=ONE_STEP)
+        most = max([*heights, 1.2])
+        if most < _TALL:
+            self.y_axis(panel, title, range=[0.0, 1.2 * most], nticks=5)
+        else:
+            low, high = np.log10(min([*heights, 1.0]) / 2.0), np.log10(most)
+            scale = {"type": "log", "range": [low, high + 0.2 * (high - low)], "dtick": 1, "tickformat": "~g"}
+            self.y_axis(panel, title, **scale)
 
     def limit(self, panel: int, x: float | None = None, y: float | None = None, colour: str = MEASURED) -> None:
         """A dotted line across a panel at a value of x or of y."""

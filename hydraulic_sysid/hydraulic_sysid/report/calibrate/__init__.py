@@ -1,0 +1,3 @@
+"""A calibration."""
+
+SCHEMA = "hydraulic_sysid.calibrate/2"

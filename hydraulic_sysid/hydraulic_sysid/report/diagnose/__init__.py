@@ -1,0 +1,3 @@
+"""A diagnosis."""
+
+SCHEMA = "hydraulic_sysid.diagnose/2"

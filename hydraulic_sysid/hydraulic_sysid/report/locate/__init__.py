@@ -1,0 +1,3 @@
+"""Where a model fails."""
+
+SCHEMA = "hydraulic_sysid.locate/2"

@@ -1,0 +1,3 @@
+"""A designed next experiment."""
+
+SCHEMA = "hydraulic_sysid.next_experiment/2"
