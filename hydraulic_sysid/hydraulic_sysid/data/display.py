@@ -57,6 +57,7 @@ MODES = {"free_run": "Free run", "horizon": "Horizon", "one_step": "One step"}
 
 _TYPESET = str.maketrans({"*": "·", "2": "²", "3": "³", "^": None})
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LARGE = 1e6
 _SHORT = 0.1
 """Seconds below which a time is shown in milliseconds."""
 
@@ -67,25 +68,27 @@ def shown(unit: str) -> tuple[float, str]:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """So many significant digits, but never less than whole numbers, with a true minus sign; a dash for no number."""
+    """So many significant digits, up to a million as a whole number, with a true minus sign; a dash for no number."""
     if value is None or not math.isfinite(value):
         return "–"
-    text = f"{value:.0f}" if abs(value) >= 10.0 ** (digits - 1) - 0.5 else f"{value:.{digits}g}"
-    mantissa, _, power = text.partition("e")
+    whole = 10.0 ** (digits - 1) - 0.5 <= abs(value) < _LARGE
+    mantissa, _, power = (f"{value:.0f}" if whole else f"{value:.{digits}g}").partition("e")
     return (f"{mantissa}·10{str(int(power)).translate(_RAISED)}" if power else mantissa).replace("-", "−")
 
 
-def quantity(value: float | None, unit: str, digits: int = 3, power: int = 1) -> str:
+def quantity(value: float | None, unit: str, digits: int = 3, power: int = 1, error: float | None = None) -> str:
     """A number with the unit that users of such benches read: 0.0123 m → ``12.3 mm``; a dash for no number.
 
     :param power: of the unit, 2 for mean squares
+    :param error: standard error, after ±
     """
     if value is None or not math.isfinite(value):
         return "–"
     scale, name = (1e3, "ms") if unit == "s" and 0.0 < abs(value) < _SHORT else shown(unit)
     if power == 2:
         name = f"({name})²" if "/" in name else f"{name}²"
-    return f"{number(value * scale**power, digits)} {name}"
+    spread = "" if error is None else f" ± {number(error * scale, 2)}"
+    return f"{number(value * scale**power, digits)}{spread} {name}"
 
 
 def span(low: float, high: float, unit: str) -> str:

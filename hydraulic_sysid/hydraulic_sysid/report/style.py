@@ -29,6 +29,8 @@ FLOOR_BAND = "rgba(139,147,161,0.25)"
 _TALL = 30.0  # residual over noise from which a bar at 1 cannot be seen any more
 TITLED = {"l": 66, "r": 14, "t": 52, "b": 44}
 """Margins of a figure whose panels have titles, below the tool bar."""
+LYING = {"l": 20, "r": 14, "t": 40, "b": 44}
+"""Margins of a figure whose bars lie, beside names of any length."""
 _GRID = "rgba(128,138,150,0.22)"
 _FRAME = "rgba(128,138,150,0.45)"
 _TEXT = "#7b8490"
@@ -50,7 +52,7 @@ class Panels:
     """Panels of one figure in rows and columns, gathered as plain dictionaries.
 
     (Plotly's own figure methods check every call against its whole schema, which takes longer than comparing
-    the records.) With ``one_time`` all panels are stacked on one x axis, so that zooming and hovering act on
+    the records.) With ``one_time`` all panels are stacked on one time axis, so that zooming and hovering act on
     all. Every text is plain: Plotly reads tags in it, which are escaped, and a line break is ``\\n``.
     """
 
@@ -100,12 +102,16 @@ class Panels:
         line = {"color": colour, "width": width, **more.pop("line", {})}
         self.line(panel, x, y, name, legend, line=line, hovertemplate="%{y:.4g}", **more)
 
-    def bars(self, panel: int, names: Any, heights: Any, name: str, colour: Any, numbers: list[str] | None = None,
-             legend: bool = False) -> None:  # fmt: skip
-        """Upright bars over names, with numbers above them."""
+    def bars(self, panel: int, names: Any, lengths: Any, name: str, colour: Any, numbers: list[str] | None = None,
+             legend: bool = False, lying: bool = False) -> None:  # fmt: skip
+        """Bars over names, upright or lying, with numbers at their ends."""
+        x, y, hover = np.array(names), values(lengths), "%{x}: %{y:.4g}"
+        if lying:
+            x, y, hover = y, x, "%{y}: %{x:.4g}"
+            self.y_axis(panel, automargin=True, type="category")
         self.line(
-            panel, np.array(names), values(heights), name, legend, type="bar", marker={"color": colour}, text=numbers,
-            textposition="outside", textangle=0, cliponaxis=False, hovertemplate="%{x}: %{y:.4g}",
+            panel, x, y, name, legend, type="bar", orientation="h" if lying else "v", marker={"color": colour},
+            text=numbers, textposition="outside", textangle=0, cliponaxis=False, hovertemplate=hover,
         )  # fmt: skip
 
     def over_noise(self, panel: int, heights: list[float], title: str = "× noise") -> None:
@@ -165,6 +171,10 @@ class Panels:
             "shapes": self.shapes,
             "annotations": self.annotations,
         }
+        if self.one_time:
+            common |= {"hovermode": "x unified", "hoversubplots": "axis"}
+            self.axes["xaxis"] |= {"anchor": f"y{self.rows}", "mirror": "all"}
+            self.axes["xaxis"]["title"].setdefault("text", "time [s]")
         return go.Figure(_plain({"data": self.traces, "layout": {**common, **self.axes, **layout}}))
 
     def _names(self, panel: int) -> tuple[str, str]:

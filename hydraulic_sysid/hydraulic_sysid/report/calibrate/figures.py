@@ -39,7 +39,7 @@ def changes(result: Result) -> go.Figure | None:
     )  # fmt: skip
     panels.x_axis(0, "change [% of the value before]", zeroline=True, zerolinewidth=2)
     panels.y_axis(0, automargin=True, type="category")
-    return panels.figure(100 + 34 * len(known), hovermode="closest", margin={"l": 20, "r": 14, "t": 34, "b": 44})
+    return panels.figure(100 + 34 * len(known), hovermode="closest", margin=style.LYING)
 
 
 def residuals(result: Result) -> go.Figure:
@@ -79,4 +79,4 @@ def correlation(result: Result) -> go.Figure:
     )  # fmt: skip
     panels.x_axis(0, automargin=True, tickangle=-30, type="category", showgrid=False)
     panels.y_axis(0, automargin=True, autorange="reversed", type="category", showgrid=False)
-    return panels.figure(150 + 40 * len(keys), hovermode="closest", margin={"l": 20, "r": 14, "t": 34, "b": 20})
+    return panels.figure(150 + 40 * len(keys), hovermode="closest", margin=style.LYING)

@@ -37,8 +37,7 @@ def overlay(result: Result, record: Result, channels: Iterable[str] = ()) -> go.
         panels.band(panel + 1, -noise, noise)
         panels.y_axis(panel, f"{result['channels'][name]['title']}\n[{unit}]", nticks=5)
         panels.y_axis(panel + 1, f"error\n[{unit}]", nticks=5)
-    panels.x_axis(0, "time [s]", anchor=f"y{len(heights)}", mirror="all")
-    return panels.figure(110 + int(66 * sum(heights)), hovermode="x unified", hoversubplots="axis")
+    return panels.figure(110 + int(66 * sum(heights)))
 
 
 def error_maps(result: Result, channel: str, record: Result | None = None) -> go.Figure:

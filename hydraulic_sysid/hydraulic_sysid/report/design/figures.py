@@ -33,8 +33,7 @@ def traces(plan: dict[str, Any], limits: dict[str, Any]) -> go.Figure:
             centre = float(plan["plan"].get("centre", 0.0)) if channel == "position" else 0.0
             for end in (centre - limit, centre + limit):
                 panels.limit(panel, y=end * factor, colour=style.FREE_RUN)
-    panels.x_axis(0, "time [s]", anchor="y4", mirror="all")
-    return panels.figure(520, hovermode="x unified", hoversubplots="axis", showlegend=False)
+    return panels.figure(520, showlegend=False)
 
 
 def spectrum(plan: dict[str, Any]) -> go.Figure:

@@ -59,7 +59,6 @@ def segment(worst: Result) -> go.Figure:
                 panels.line(row + 1, time, style.values(left), key, line={"color": colour, "width": 1})
         panels.y_axis(row, f"{TITLES.get(channel, channel)}\n[{unit}]")
         panels.y_axis(row + 1, "× noise")
-    panels.x_axis(0, "time [s]", anchor=f"y{1 + 2 * len(channels)}")
     return panels.figure(160 + 250 * len(channels))
 
 

@@ -50,7 +50,7 @@ def bode(result: Result) -> go.Figure:
     panels.y_axis(0, f"magnitude\n[{above}/{below}]", **_LOG)
     panels.y_axis(1, "phase [°]", dtick=90, range=[-275.0, 95.0])
     panels.y_axis(2, "coherence", range=[0.0, 1.05], nticks=3)
-    panels.x_axis(0, "frequency [Hz]", anchor="y3", mirror="all", range=_span(result), **_FREQUENCY)
+    panels.x_axis(0, "frequency [Hz]", range=_span(result), **_FREQUENCY)
     return panels.figure(520, margin=_MARGIN, hovermode="closest")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import plotly.graph_objects as go
 
 from hydraulic_sysid.data.display import first_upper
@@ -24,15 +23,13 @@ def share_bars(result: Result) -> go.Figure:
     """One bar per channel: the parts of the white box's mean squared error on test data, in percent."""
     panels = Panels(1)
     channels = list(result["channels"].values())[::-1]
-    names = np.array([first_upper(c["title"]) for c in channels])
+    names = [first_upper(c["title"]) for c in channels]
     for key, title, colour in PARTS:
-        shares = style.values([c["shares"][key] for c in channels], 100.0)
-        bar: dict[str, Any] = {"type": "bar", "orientation": "h", "marker": {"color": colour}}
-        panels.line(0, shares, names, title, legend=True, hovertemplate="%{x:.1f} %", **bar)
+        shares = [100.0 * c["shares"][key] for c in channels]
+        panels.bars(0, names, shares, title, colour, legend=True, lying=True)
     panels.x_axis(0, "share of the mean squared error [%]", range=[0, 100])
     height = 130 + 50 * len(names)
-    margin = {"l": 110, "r": 14, "t": 34, "b": 76}
-    legend = style.below(52 / (height - 110))
+    margin, legend = {**style.LYING, "b": 76}, style.below(52 / (height - 110))
     return panels.figure(height, barmode="stack", hovermode="closest", bargap=0.35, legend=legend, margin=margin)
 
 
@@ -46,5 +43,4 @@ def traces(channel: Result, record: int) -> go.Figure:
     panels.trace(1, own["grey"], factor, "left by both", style.FREE_RUN, legend=True)
     panels.y_axis(0, f"{channel['title']}\n[{unit}]", nticks=6)
     panels.y_axis(1, f"left\n[{unit}]", nticks=4)
-    panels.x_axis(0, "time [s]", anchor="y2", mirror="all")
-    return panels.figure(360, hovermode="x unified", hoversubplots="axis")
+    return panels.figure(360)

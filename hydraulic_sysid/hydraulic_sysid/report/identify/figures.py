@@ -32,8 +32,7 @@ def overlay(settings: Result, record: Result) -> go.Figure:
     panels.y_axis(0, f"{settings['input']['channel']}\n[{input_unit}]", nticks=4)
     panels.y_axis(1, f"{settings['output']['channel']}\n[{unit}]", nticks=6)
     panels.y_axis(2, f"error\n[{unit}]", nticks=5)
-    panels.x_axis(0, "time [s]", anchor="y3", mirror="all")
-    return panels.figure(430, hovermode="x unified", hoversubplots="axis")
+    return panels.figure(430)
 
 
 def residual_tests(record: Result) -> go.Figure | None:

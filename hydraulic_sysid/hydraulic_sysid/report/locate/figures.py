@@ -45,20 +45,14 @@ def shares(result: Result) -> go.Figure:
     """Share of each subsystem in what is missing: in the order of their taking in, and alone."""
     rows = list(reversed(result["attribution"]))
     names = np.array([SUBSYSTEMS.get(s["name"], s["name"]) for s in rows])
-    ordered, alone = (np.clip(style.values([s[k] for s in rows], 100.0), 0.0, 100.0) for k in ("share", "alone"))
+    ordered, alone = (np.clip([100.0 * s[k] for s in rows], 0.0, 100.0) for k in ("share", "alone"))
     panels = Panels(1)
-    panels.line(
-        0, ordered, names, "taken in order", True, type="bar", orientation="h", marker={"color": style.HORIZON},
-        text=[f"{100.0 * s['share']:.1f} %" for s in rows], textposition="outside", cliponaxis=False,
-        hovertemplate="%{y}: %{x:.3g} %<extra></extra>",
-    )  # fmt: skip
+    numbers = [f"{100.0 * s['share']:.1f} %" for s in rows]
+    panels.bars(0, names, ordered, "taken in order", style.HORIZON, numbers, legend=True, lying=True)
     diamond = {"size": 11, "color": style.FREE_RUN, "symbol": "diamond-open", "line": {"width": 2}}
-    hover = "%{y} alone: %{x:.3g} %<extra></extra>"
-    panels.line(0, alone, names, "alone", True, mode="markers", marker=diamond, hovertemplate=hover)
+    panels.line(0, style.values(alone), names, "alone", True, mode="markers", marker=diamond)
     panels.x_axis(0, "share of what is missing [%]", range=[0.0, 112.0])
-    panels.y_axis(0, automargin=True, type="category")
-    margin = {"l": 20, "r": 14, "t": 40, "b": 44}
-    return panels.figure(110 + 36 * len(rows), hovermode="closest", bargap=0.45, margin=margin)
+    return panels.figure(110 + 36 * len(rows), hovermode="closest", bargap=0.45, margin=style.LYING)
 
 
 def spectra(result: Result) -> go.Figure:

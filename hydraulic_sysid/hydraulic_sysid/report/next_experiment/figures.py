@@ -33,8 +33,13 @@ def traces(result: Result) -> go.Figure:
             panels.limit(panel, x=movement["start"])
     first = result["movements"][0]["start"]
     end = first + result["settings"]["seconds"]
-    panels.x_axis(0, "time [s]", anchor=f"y{1 + len(channels)}", mirror="all", range=[first - 0.5, end + 0.5])
-    return panels.figure(120 + 110 * (1 + len(channels)), hovermode="x unified", hoversubplots="axis")
+    panels.x_axis(0, "time [s]", range=[first - 0.5, end + 0.5])
+    return panels.figure(120 + 110 * (1 + len(channels)))
+
+
+def refits(result: Result) -> list[str]:
+    """Which model is refitted to what which other does, pair by pair."""
+    return [f"{pair['refitted']} to {pair['true']}" for pair in result["pairs"]]
 
 
 def differences(pair: dict[str, Any]) -> go.Figure:
@@ -47,29 +52,18 @@ def differences(pair: dict[str, Any]) -> go.Figure:
         panels.band(panel, -1.0, 1.0)
         reach = 1.1 * max(float(np.nanmax(np.abs(style.values(trace["value"])), initial=0.0)), 1.5)
         panels.y_axis(panel, f"{title}\n[× noise]", nticks=5, range=[-reach, reach])
-    panels.x_axis(0, "time [s]", anchor=f"y{len(channels)}", mirror="all")
-    return panels.figure(90 + 150 * len(channels), hovermode="x unified", hoversubplots="axis", showlegend=False)
+    return panels.figure(90 + 150 * len(channels), showlegend=False)
 
 
 def experiments(result: Result) -> go.Figure:
     """Separation of the closest pair by kind of experiment, as bars."""
     rows = list(reversed(result["compared_experiments"]))
     panels = Panels(1)
-    panels.line(
-        0,
-        style.values([max(row["separation"], 1e-3) for row in rows]),
-        np.array([first_upper(row["description"]) for row in rows]),
-        type="bar",
-        orientation="h",
-        marker={"color": [style.HORIZON if row["kind"] == "chosen" else style.MEASURED for row in rows]},
-        text=[number(row["separation"]) for row in rows],
-        textposition="outside",
-        cliponaxis=False,
-        hovertemplate="%{y}: %{x:.3g}<extra></extra>",
-    )
-    highest = max(row["separation"] for row in rows)
+    names, lengths = [first_upper(row["description"]) for row in rows], [row["separation"] for row in rows]
+    colours = [style.HORIZON if row["kind"] == "chosen" else style.MEASURED for row in rows]
+    panels.bars(0, names, lengths, "separation", colours, [number(v) for v in lengths], lying=True)
+    highest = max(lengths)
     panels.x_axis(0, "separation of the closest pair [standard deviations]", range=[0.0, 1.12 * max(highest, 1e-3)])
-    panels.y_axis(0, automargin=True, type="category")
     if result["settings"]["decisive_separation"] < 1.1 * highest:
         panels.limit(0, x=result["settings"]["decisive_separation"], colour=style.ONE_STEP)
-    return panels.figure(80 + 30 * len(rows), hovermode="closest", margin={"l": 20, "r": 40, "t": 14, "b": 44})
+    return panels.figure(80 + 30 * len(rows), hovermode="closest", margin=style.LYING)

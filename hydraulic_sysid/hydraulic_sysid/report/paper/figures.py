@@ -25,8 +25,7 @@ def data(excitation: dict[str, Any]) -> go.Figure:
         panels.trace(panel, excitation["traces"][key], factor, key, colours[panel], 1.3)
         panels.y_axis(panel, f"{key}\n[{shown}]", nticks=5)
         panels.interval(panel, excitation["test_from"], excitation["duration"])
-    panels.x_axis(0, "time [s]", anchor="y2", mirror="all")
-    return panels.figure(330, margin=_MARGIN, hovermode="x unified", hoversubplots="axis", showlegend=False)
+    return panels.figure(330, margin=_MARGIN, showlegend=False)
 
 
 def fit(excitation: dict[str, Any]) -> go.Figure:
@@ -41,8 +40,8 @@ def fit(excitation: dict[str, Any]) -> go.Figure:
         panels.trace(panel, excitation["traces"][key], factor, name, colour, width, legend=panel == 0)
     panels.y_axis(0, f"position\n[{unit}]", nticks=6)
     panels.y_axis(1, f"difference\n[{unit}]", nticks=4)
-    panels.x_axis(0, "time in the test data [s]", anchor="y2", mirror="all")
-    return panels.figure(360, margin=_MARGIN, hovermode="x unified", hoversubplots="axis")
+    panels.x_axis(0, "time in the test data [s]")
+    return panels.figure(360, margin=_MARGIN)
 
 
 def rmse(result: Result) -> go.Figure:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import plotly.graph_objects as go
 
 from hydraulic_sysid.report import style
@@ -23,11 +22,8 @@ def rmse_bars(result: dict[str, Any]) -> go.Figure:
         cells = [c for c in result["grid"] if c["shape"] == shape]
         names = [f"{c['amplitude']:g} V\n{c['frequency']:g} Hz{'' if c['within_travel'] else ' *'}" for c in cells]
         for index, model in enumerate(result["models"]):
-            panels.line(
-                panel, np.array(names), style.values([c["models"][model["name"]]["rmse"] for c in cells], factor),
-                model["name"], legend=panel == 0, type="bar", marker={"color": _COLOURS[index % len(_COLOURS)]},
-                hovertemplate="%{y:.3g} " + unit,
-            )  # fmt: skip
+            heights = style.values([c["models"][model["name"]]["rmse"] for c in cells], factor)
+            panels.bars(panel, names, heights, model["name"], _COLOURS[index % len(_COLOURS)], legend=panel == 0)
         panels.y_axis(panel, f"RMSE [{unit}]" if panel % columns == 0 else "", rangemode="tozero", nticks=6)
         panels.x_axis(panel, tickfont={"size": 10})
     legend = {"orientation": "h", "x": 0, "y": 1.06, "yanchor": "bottom", "xanchor": "left"}
