@@ -56,7 +56,7 @@ def test_the_model_that_was_written_has_the_effect_and_says_where_from(run: Path
 
 def test_the_page_shows_what_the_document_holds(run: Path) -> None:
     page = (run / "report.html").read_text()
-    for word in ("The error falls", "Before and after", "Why not another", "valve_deadband"):
+    for word in ("The error falls", "Before and after", "Competing models", "valve_deadband"):
         assert word in page
 
 
