@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 
 from hydraulic_control.session import ControlSession
 from hydraulic_interfaces.contract import CONTROLLER_NODE, absolute
-from hydraulic_interfaces.conversions import to_time
-
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+from hydraulic_node_utils.nodes import diagnostics
+from hydraulic_node_utils.nodes.diagnostics import ERROR, OK, WARN
 
 
 class ControllerHealth:
@@ -53,13 +52,5 @@ class ControllerHealth:
             level, text = WARN, session.trouble
         elif state == "active" and rate == 0.0:
             level, text = ERROR, "no state can be answered: drive is 0 V"
-        row = DiagnosticStatus(
-            level=level,
-            name=f"{absolute(CONTROLLER_NODE)}: loop",
-            message=text,
-            hardware_id="controller",
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
-        array = DiagnosticArray(status=[row])
-        array.header.stamp = to_time(now_ns)
-        return array
+        row = diagnostics.row(f"{absolute(CONTROLLER_NODE)}: loop", level, text, values, "controller")
+        return diagnostics.array(now_ns, row)

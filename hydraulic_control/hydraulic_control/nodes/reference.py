@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -22,8 +22,9 @@ from hydraulic_control.nodes._reference_parameters import PARAMETERS
 from hydraulic_control.reference_run import ReferenceRun
 from hydraulic_control.trajectories import Limits
 from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE, absolute
-from hydraulic_interfaces.conversions import MessageError, ReferenceEncoder, sample_from_messages, to_time
+from hydraulic_interfaces.conversions import MessageError, ReferenceEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes import diagnostics
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
 
@@ -112,16 +113,10 @@ class ReferenceNode(ServedNode):
 
     def _publish_health(self) -> None:
         state = f"plays {self._run.kind}" if self._run else "waits for states" if self._armed else self._end
-        row = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if self._failed else DiagnosticStatus.OK,
-            name=f"{absolute(REFERENCE_NODE)}: run",
-            message=state,
-            hardware_id="reference",
-            values=[KeyValue(key="last_run", value=self._end)],
-        )
-        array = DiagnosticArray(status=[row])
-        array.header.stamp = to_time(self.get_clock().now().nanoseconds)
-        self._diagnostics.publish(array)
+        level = diagnostics.WARN if self._failed else diagnostics.OK
+        values = {"last_run": self._end}
+        row = diagnostics.row(f"{absolute(REFERENCE_NODE)}: run", level, state, values, "reference")
+        self._diagnostics.publish(diagnostics.array(self.get_clock().now().nanoseconds, row))
 
     def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._run is not None or self._armed is not None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from hydraulic_interfaces.contract import ESTIMATOR_NODE, absolute
 from hydraulic_interfaces.conversions import to_time
+from hydraulic_node_utils.nodes import diagnostics
 from hydraulic_sysid.linear.models.recursive import RecursiveArx, Step
 from hydraulic_sysid.linear.online import RunningFit
 
@@ -40,16 +41,9 @@ def fit(step: Step, running: RunningFit, stamp_ns: int) -> JointState:
 
 def health(text: str, trouble: bool, values: dict[str, object], now_ns: int) -> DiagnosticArray:
     """The estimator's row on `/diagnostics`."""
-    row = DiagnosticStatus(
-        level=DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK,
-        name=f"{absolute(ESTIMATOR_NODE)}: estimate",
-        message=text,
-        hardware_id="estimator",
-        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-    )
-    array = DiagnosticArray(status=[row])
-    array.header.stamp = to_time(now_ns)
-    return array
+    level = diagnostics.WARN if trouble else diagnostics.OK
+    row = diagnostics.row(f"{absolute(ESTIMATOR_NODE)}: estimate", level, text, values, "estimator")
+    return diagnostics.array(now_ns, row)
 
 
 def _named(names: list[str], stamp_ns: int) -> JointState:

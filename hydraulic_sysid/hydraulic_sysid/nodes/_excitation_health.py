@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 
 from hydraulic_interfaces.contract import EXCITATION_NODE, absolute
-from hydraulic_interfaces.conversions import to_time
+from hydraulic_node_utils.nodes import diagnostics
 from hydraulic_sysid.excitation import Session
 
 
@@ -17,13 +17,6 @@ def health(session: Session, waiting_for: str, now_ns: int) -> DiagnosticArray:
     if run is not None:
         message = f"{run.phase.value}: {run.plan.name}, {run.progress:.0%}"
         values |= {"plan": run.plan.name, "progress": f"{run.progress:.3f}", "drive_V": f"{run.drive:.4f}"}
-    row = DiagnosticStatus(
-        level=DiagnosticStatus.WARN if session.ended_badly else DiagnosticStatus.OK,
-        name=f"{absolute(EXCITATION_NODE)}: run",
-        message=message,
-        hardware_id="excitation",
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )
-    array = DiagnosticArray(status=[row])
-    array.header.stamp = to_time(now_ns)
-    return array
+    level = diagnostics.WARN if session.ended_badly else diagnostics.OK
+    row = diagnostics.row(f"{absolute(EXCITATION_NODE)}: run", level, message, values, "excitation")
+    return diagnostics.array(now_ns, row)

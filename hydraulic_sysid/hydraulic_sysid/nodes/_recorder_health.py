@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from hydraulic_interfaces.contract import topic
-from hydraulic_interfaces.conversions import to_time
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes import diagnostics
+from hydraulic_node_utils.nodes.diagnostics import ERROR, OK, WARN
 from hydraulic_sysid.data.bag import Recording
 
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 # Ten seconds of the five streams at 1 kHz: the disk is not keeping up.
 _QUEUE_WARNING = 50_000
 
@@ -43,15 +43,8 @@ class RecorderHealth:
         values.update({f"missing {topic}": count for topic, count in missing.items()})
         self._then, self._before = now_ns, received
         level, text = self._judge(state, sum(missing.values()))
-        status = DiagnosticStatus(
-            level=level,
-            name=f"{self._name}: recording",
-            message=text,
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = to_time(now_ns)
-        self._publisher.publish(array)
+        row = diagnostics.row(f"{self._name}: recording", level, text, values)
+        self._publisher.publish(diagnostics.array(now_ns, row))
 
     def _judge(self, state: str, missing: int) -> tuple[bytes, str]:
         more, self._missing = missing - self._missing, missing

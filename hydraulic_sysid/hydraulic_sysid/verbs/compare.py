@@ -7,9 +7,11 @@ Runs the model beside every record in free run, a horizon ahead and one step ahe
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
+from rich.table import Table
 
 from hydraulic_node_utils import tables
 from hydraulic_sim.model_file import load_model
@@ -42,21 +44,27 @@ def _compare(options: argparse.Namespace, say: opt.Say) -> opt.Done:
 
 
 def _show(result: dict[str, Any], console: Console) -> None:
-    shown = {name: result["channels"][name] for name in _telling(result)}
+    console.print(error_table(result, _telling(result)))
+    console.print(result["verdict"]["text"])
+    for finding in [f for f in result["findings"] if f["kind"] in ("bias", "depends_on")][:_LISTED]:
+        if finding["text"] not in result["verdict"]["text"]:
+            console.print(f"• {finding['text']}")
+
+
+def error_table(result: dict[str, Any], names: Sequence[str], overall: bool = True) -> Table:
+    """Errors of those channels for every record, over all records (``overall``), and the noise beside them."""
+    shown = {name: result["channels"][name] for name in names}
+    summary = result["summary"]
     title = f"{result['model']['name']}: RMS error {result['settings']['horizon']:g} s ahead (× that of an exact model)"
     table = tables.table(title, ("|record", *(f">{first_upper(c['title'])}" for c in shown.values())))
     for record in result["records"]:
         cells = (_cell(record["channels"].get(name, {}).get("horizon"), c["unit"]) for name, c in shown.items())
         table.add_row(record["name"], *cells)
     table.add_section()
-    summary = result["summary"]
-    table.add_row("all", *(_cell(summary[name]["horizon"], c["unit"]) for name, c in shown.items()), style="bold")
+    if overall:
+        table.add_row("all", *(_cell(summary[name]["horizon"], c["unit"]) for name, c in shown.items()), style="bold")
     table.add_row("noise", *(quantity(summary[name]["noise_std"], c["unit"]) for name, c in shown.items()))
-    console.print(table)
-    console.print(result["verdict"]["text"])
-    for finding in [f for f in result["findings"] if f["kind"] in ("bias", "depends_on")][:_LISTED]:
-        if finding["text"] not in result["verdict"]["text"]:
-            console.print(f"• {finding['text']}")
+    return table
 
 
 def _telling(result: dict[str, Any]) -> list[str]:

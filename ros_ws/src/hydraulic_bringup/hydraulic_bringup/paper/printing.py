@@ -6,8 +6,8 @@ from typing import Any
 
 from rich import box
 from rich.console import Console
-from rich.table import Table
 
+from hydraulic_node_utils import tables
 from hydraulic_sysid.data.display import number
 
 
@@ -21,9 +21,8 @@ def show(result: dict[str, Any], console: Console) -> None:
 
 
 def _models(result: dict[str, Any], console: Console) -> None:
-    table = Table(title="models (the paper's figures in brackets)", title_justify="left")
-    for title in ("excitation", "model", "best fit, held out", "MSE, mm²", "FPE, mm²"):
-        table.add_column(title, justify="left" if title in ("excitation", "model") else "right")
+    columns = ("excitation", "model", ">best fit, held out", ">MSE, mm²", ">FPE, mm²")
+    table = tables.table("models (the paper's figures in brackets)", columns)
     for r in result["models"]:
         table.add_row(
             r["excitation"],
@@ -39,9 +38,8 @@ def _models(result: dict[str, Any], console: Console) -> None:
 
 
 def _thesis(result: dict[str, Any], console: Console) -> None:
-    table = Table(title="the thesis: excitation over the bandwidth", title_justify="left")
-    for title in ("excitation", "band", "best fit in the paper's band", "RMSE over the grid, mm"):
-        table.add_column(title, justify="left" if title == "excitation" else "right")
+    columns = ("excitation", ">band", ">best fit in the paper's band", ">RMSE over the grid, mm")
+    table = tables.table("the thesis: excitation over the bandwidth", columns)
     for r in result["thesis"]["rows"]:
         low, high = r["band_over_bandwidth"]
         table.add_row(r["name"], f"{low:g} … {high:g}", _fit(r["best_fit_in_band"]), _mm(r["rmse"]))
@@ -53,9 +51,8 @@ def _thesis(result: dict[str, Any], console: Console) -> None:
 def _grid(result: dict[str, Any], console: Console) -> None:
     names = [r["name"] for r in result["thesis"]["rows"]]
     title = "RMSE against the nonlinear plant, mm; in the last rows against records"
-    table = Table(title=title, title_justify="left", box=box.SIMPLE, padding=(0, 1, 0, 0))
-    for name in ("signal", "V", "Hz", *names):
-        table.add_column(name.replace("_", "\n"), justify="left" if name == "signal" else "right", no_wrap=True)
+    columns = ("|signal", ">|V", ">|Hz", *(f">|{name}".replace("_", "\n") for name in names))
+    table = tables.table(title, columns, box=box.SIMPLE, padding=(0, 1, 0, 0))
     for cell in result["grid"]:
         values = [_mm(cell["models"][name]["rmse"]) for name in names]
         table.add_row(cell["shape"], number(cell["amplitude"]), number(cell["frequency"]), *values)
@@ -68,12 +65,8 @@ def _grid(result: dict[str, Any], console: Console) -> None:
 def _control(result: dict[str, Any], console: Console) -> None:
     if result["control"] is None:
         return
-    table = Table(
-        title=f"step of {1e3 * result['control']['step']:g} mm with NPID (the paper's figures in brackets)",
-        title_justify="left",
-    )
-    for title in ("plant", "rise time, s", "settling time, s", "overshoot, %"):
-        table.add_column(title, justify="left" if title == "plant" else "right")
+    title = f"step of {1e3 * result['control']['step']:g} mm with NPID (the paper's figures in brackets)"
+    table = tables.table(title, ("plant", ">rise time, s", ">settling time, s", ">overshoot, %"))
     for row in result["control"]["rows"]:
         figures = (
             f"{'–' if row[key] is None else format(row[key], '.3g')} ({row['printed'][key]:g})"

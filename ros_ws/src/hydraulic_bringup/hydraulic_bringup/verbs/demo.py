@@ -12,17 +12,16 @@ import sys
 import time
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from hydraulic_bringup.demo import offline, online
-from hydraulic_node_utils import cli
+from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.data.display import number, quantity
+from hydraulic_sysid.data.display import number
 from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.verbs.compare import error_table
 
 DATA_SHEET = "moog_mcr_m_1002_bench"
 RUNS = Path("runs")
@@ -147,22 +146,7 @@ def new_folder(wanted: Path | None, name: str) -> Path:
 
 def _print(analysis: offline.Analysis, console: Console) -> None:
     compared = analysis.compared
-    channels: dict[str, Any] = {n: c for n, c in compared["channels"].items() if n in SHOWN}
-    ahead = f"{compared['settings']['horizon']:g} s ahead"
-    table = Table(
-        title=f"RMS error of {compared['model']['name']} {ahead} (× that of an exact model)", title_justify="left"
-    )
-    table.add_column("record", no_wrap=True)
-    for channel in channels.values():
-        table.add_column(channel["title"], justify="right")
-    for record in compared["records"]:
-        figures = [record["channels"].get(name, {}).get("horizon") for name in channels]
-        cells = [_cell(f, c["unit"]) for f, c in zip(figures, channels.values(), strict=True)]
-        table.add_row(record["name"], *cells)
-    noise = [compared["summary"][name]["noise_std"] for name in channels]
-    table.add_section()
-    table.add_row("noise", *(quantity(n, c["unit"]) for n, c in zip(noise, channels.values(), strict=True)))
-    console.print(table)
+    console.print(error_table(compared, [name for name in compared["channels"] if name in SHOWN], overall=False))
     if analysis.identified is not None:
         console.print(analysis.identified["verdict"]["text"])
     if analysis.left_out:
@@ -170,22 +154,11 @@ def _print(analysis: offline.Analysis, console: Console) -> None:
     console.print(compared["verdict"]["text"])
     residual = analysis.diagnosed["residual"]
     added = residual["after_each_effect"]
-    names = ["as it is", *(f"+ {s['name']}" for s in added)]
-    table = Table(title="diagnosis: residual over noise on validation data (1: an exact model)", title_justify="left")
-    for name in names:
-        table.add_column(name, justify="right")
-    table.add_row(*(number(at["validation"]) for at in (residual["before"], *added)))
-    console.print(table)
+    columns = (">as it is", *(f">+ {s['name']}" for s in added))
+    row = [number(at["validation"]) for at in (residual["before"], *added)]
+    title = "diagnosis: residual over noise on validation data (1: an exact model)"
+    console.print(tables.table(title, columns, [row]))
     console.print(analysis.diagnosed["verdict"]["text"])
-
-
-def _cell(figures: dict[str, Any] | None, unit: str) -> str:
-    """An error, and how many times the error of an exact model under the same noise it is."""
-    if figures is None:
-        return "–"
-    exact = figures.get("exact_rmse")
-    times = f" ({number(figures['rmse'] / exact)}×)" if exact else ""
-    return f"{quantity(figures['rmse'], unit)}{times}"
 
 
 if __name__ == "__main__":

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from hydraulic_interfaces.conversions import to_time
+from hydraulic_node_utils.nodes import diagnostics
+from hydraulic_node_utils.nodes.diagnostics import ERROR, OK, WARN
 from hydraulic_plant_node.command_gate import CommandGate, Verdict
 from hydraulic_plant_node.plant_backend import PlantBackend
 from hydraulic_plant_node.plant_loop import PlantLoop
 
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 # A wall clock set by more than this makes commands look stale and records inconsistent.
 _CLOCK_STEP_S = 0.01
 
@@ -32,11 +32,8 @@ class PlantHealth:
 
     def message(self, state: str, loop: PlantLoop | None, error: str, now_ns: int) -> DiagnosticArray:
         """The diagnostics now; `state` is the lifecycle state, `error` what made the node leave `active`."""
-        array = DiagnosticArray(status=[self._plant(state, error), self._command(state, loop, now_ns)])
-        array.header.stamp = to_time(now_ns)
-        if loop is not None:
-            array.status.append(self._timing(loop))
-        return array
+        timing = [self._timing(loop)] if loop is not None else []
+        return diagnostics.array(now_ns, self._plant(state, error), self._command(state, loop, now_ns), *timing)
 
     def _plant(self, state: str, error: str) -> DiagnosticStatus:
         gate = self._gate
@@ -122,10 +119,4 @@ class PlantHealth:
         return value - before if value >= before else value
 
     def _status(self, part: str, level: bytes, message: str, values: Mapping[str, Any]) -> DiagnosticStatus:
-        return DiagnosticStatus(
-            level=level,
-            name=f"{self._name}: {part}",
-            message=message,
-            hardware_id=self._backend.hardware_id,
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
+        return diagnostics.row(f"{self._name}: {part}", level, message, values, self._backend.hardware_id)
