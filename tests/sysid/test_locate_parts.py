@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from hydraulic_sysid.diagnosis.locate.blame import PARAMETERS, rank
-from hydraulic_sysid.diagnosis.locate.curves import play, rate_limited, signed_knots, tents
-from hydraulic_sysid.diagnosis.locate.lines import common_lines, waves
-from hydraulic_sysid.diagnosis.locate.moments import FOLDS, Moments
-from hydraulic_sysid.diagnosis.locate.noise_model import ORDER, Whitener, thin
+from hydraulic_sysid.diagnosis.locate.attribution import PARAMETERS, attribute
+from hydraulic_sysid.diagnosis.locate.basis import hat_functions, play, rate_limited, signed_knots
+from hydraulic_sysid.diagnosis.locate.normal_equations import FOLDS, NormalEquations
+from hydraulic_sysid.diagnosis.locate.spectral_lines import common_lines, waves
+from hydraulic_sysid.diagnosis.locate.whitening import ORDER, Whitener, decimate
 from hydraulic_sysid.verbs.locate import main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "sample_bench"
@@ -21,11 +21,11 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "sample_bench"
 
 def test_thinning_keeps_a_slow_signal_and_takes_the_noise_down() -> None:
     t = np.arange(5000) * 1e-3
-    kept = thin(np.sin(2 * np.pi * t), 5)
+    kept = decimate(np.sin(2 * np.pi * t), 5)
     assert kept == pytest.approx(np.sin(2 * np.pi * t[6 : 6 + 5 * kept.size : 5]), abs=1e-3)
     noise = np.random.default_rng(0).standard_normal((3, 50_000))
-    assert thin(noise, 5).std(axis=1) == pytest.approx(np.full(3, np.sqrt(0.11)), rel=0.03)
-    assert thin(noise, 1) is noise
+    assert decimate(noise, 5).std(axis=1) == pytest.approx(np.full(3, np.sqrt(0.11)), rel=0.03)
+    assert decimate(noise, 1) is noise
 
 
 def test_whitened_noise_is_white_of_variance_one_also_where_the_whitener_was_not_made() -> None:
@@ -55,7 +55,7 @@ def test_tents_make_any_piecewise_linear_curve() -> None:
     x = np.random.default_rng(3).uniform(-2.0, 2.0, 500)
     knots = signed_knots(x, 5)
     assert knots.size == 11 and knots[5] == 0.0 and np.all(np.diff(knots) > 0.0)
-    basis = tents(x, knots)
+    basis = hat_functions(x, knots)
     assert basis.sum(axis=0) == pytest.approx(np.ones(500))
     inside = np.abs(x) < knots[-1]
     assert (knots @ basis)[inside] == pytest.approx(x[inside])
@@ -82,11 +82,11 @@ def test_line_common_to_records_is_found_and_one_of_the_excitation_is_not() -> N
     assert both.shape == (8, t.size) and not both[:2].any() and both[2:4].any() and not both[4:].any()
 
 
-def _moments(seed: int, coefficients: np.ndarray, size: int) -> tuple[Moments, np.ndarray, np.ndarray]:
+def _moments(seed: int, coefficients: np.ndarray, size: int) -> tuple[NormalEquations, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     x = rng.standard_normal((coefficients.size, 1, size))
     y = coefficients @ x[:, 0] + rng.standard_normal(size)
-    return Moments.of(x, y[None], 200.0), x[:, 0], y
+    return NormalEquations.of(x, y[None], 200.0), x[:, 0], y
 
 
 def test_what_is_left_on_other_folds_is_the_noise_and_bounds_bind() -> None:
@@ -105,12 +105,14 @@ def test_what_is_left_on_other_folds_is_the_noise_and_bounds_bind() -> None:
 def test_ranking_takes_the_cause_first_and_gives_a_stand_in_nothing() -> None:
     rng = np.random.default_rng(6)
     cause, other = rng.standard_normal((2, 8000))
-    stand_in = 0.9 * cause + 0.45 * rng.standard_normal(8000)
-    x = np.stack([rng.standard_normal(8000), cause, stand_in, other])[:, None]
+    proxy = 0.9 * cause + 0.45 * rng.standard_normal(8000)
+    x = np.stack([rng.standard_normal(8000), cause, proxy, other])[:, None]
     y = (2.0 * cause + 0.5 * other + rng.standard_normal(8000))[None]
-    twin = Moments.of(x, rng.standard_normal((1, 8000)), 200.0)
+    reference = NormalEquations.of(x, rng.standard_normal((1, 8000)), 200.0)
     names = [PARAMETERS, "valve", "sensor", "force"]
-    verdict = rank(Moments.of(x, y, 200.0), twin, names, ["", "opening", "lag", "velocity"], [(-1.0, 1.0)])
+    verdict = attribute(
+        NormalEquations.of(x, y, 200.0), reference, names, ["", "opening", "lag", "velocity"], [(-1.0, 1.0)]
+    )
     share = {b.subsystem: b.share for b in verdict.ranked}
     assert [b.subsystem for b in verdict.ranked][:2] == ["valve", "force"]
     assert share["valve"] > 0.9 and share["force"] == pytest.approx(0.25 / 4.25, abs=0.02) and share["sensor"] == 0.0

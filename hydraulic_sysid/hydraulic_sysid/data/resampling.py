@@ -36,6 +36,12 @@ def sampled(output: ArrayLike, dt: float, sampling_time: float) -> Array:
     return np.interp(_instants(y.size, dt, sampling_time), dt * np.arange(y.size), y)
 
 
+def delayed(values: Array, samples: int) -> Array:
+    """The values ``(N,)`` that many samples later; the first one where there was none yet."""
+    late = min(samples, values.size)
+    return np.concatenate((np.full(late, values[0]), values[: values.size - late]))
+
+
 def _instants(count: int, dt: float, sampling_time: float, whole: bool = False) -> Array:
     """Beginnings of the new samples that lie wholly in the record; with ``whole`` the end of the last one too."""
     if sampling_time < dt * (1.0 - 1e-9):

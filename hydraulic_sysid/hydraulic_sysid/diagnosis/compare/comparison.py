@@ -120,12 +120,11 @@ def error_maps(compared: Sequence[Compared], channels: Sequence[str]) -> dict[st
             values[name] = np.concatenate([c.data.record.time - c.data.record.time[0] for c in compared])
         elif all(name in c.data.channels for c in compared):
             values[name] = np.concatenate([c.data.channels[name] for c in compared])
-    edges: dict[str, Array | None] = {name: None for name in values}
-    categories = [
+    binnings = {name: errormaps.Binning.of(x) for name, x in values.items()}
+    directions = [
         errormaps.directions(c.data.channels["velocity"], _STANDING * c.data.noise["velocity"]) for c in compared
     ]
-    values["direction"], edges["direction"] = np.concatenate([k for k, _ in categories]), categories[0][1]
-    binnings = {name: errormaps.Binning.of(x, edges[name]) for name, x in values.items()}
+    binnings["direction"] = errormaps.Binning.of(np.concatenate(directions), errormaps.DIRECTION_EDGES)
     maps: dict[str, dict[str, ErrorMap]] = {}
     for channel in channels:
         error = np.concatenate(

@@ -16,6 +16,8 @@ from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.estimation.metrics import autocorrelation
 
 BINS = 32
+DIRECTION_EDGES: Array = np.array([-1.5, -0.5, 0.5, 1.5])
+"""Of the bins of `directions`."""
 _SMALLEST_BIN = 20
 _BLOCK_SECONDS = 0.5
 _VANISHED = 0.05
@@ -162,7 +164,6 @@ def cross_validated_share(error: Array, index: Index, folds: Index, bins: int) -
     return float(1.0 - left / whole) if whole > 0.0 else float("nan")
 
 
-def directions(velocity: Array, threshold: float) -> tuple[Array, Array]:
-    """Category −1 (retracting), 0 (standing, within ±threshold) or 1 (extending), and the bin edges."""
-    category = np.where(velocity > threshold, 1.0, np.where(velocity < -threshold, -1.0, 0.0))
-    return category, np.array([-1.5, -0.5, 0.5, 1.5])
+def directions(velocity: Array, threshold: float) -> Array:
+    """Category −1 (retracting), 0 (standing, within ±threshold) or 1 (extending)."""
+    return np.where(velocity > threshold, 1.0, np.where(velocity < -threshold, -1.0, 0.0))

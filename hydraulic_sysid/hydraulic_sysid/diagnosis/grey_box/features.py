@@ -14,6 +14,7 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array, Mask
 from hydraulic_sysid.data.display import TITLES
+from hydraulic_sysid.data.resampling import delayed
 
 LAGS = (0.0, 0.01, 0.02, 0.04, 0.08, 0.16)
 """Delays of the drive in seconds."""
@@ -53,7 +54,7 @@ def terms(signals: Mapping[str, Array], dt: float, scales: Scales) -> Terms:
     found: list[tuple[str, Array, bool]] = [("constant", np.ones(s["drive"].size), True)]
     for lag in sorted({round(lag / dt) for lag in LAGS}):
         when = f" {lag * dt * 1e3:g} ms before" if lag else ""
-        found.append((f"drive{when}", _delayed(s["drive"], lag), True))
+        found.append((f"drive{when}", delayed(s["drive"], lag), True))
     found += [(_title(name), x, True) for name, x in s.items() if name != "drive"]
     direction = np.tanh(s["velocity"] / _STANDING)
     found.append(("direction of motion", direction, False))
@@ -79,10 +80,3 @@ def terms(signals: Mapping[str, Array], dt: float, scales: Scales) -> Terms:
 
 def _title(channel: str) -> str:
     return TITLES.get(channel, channel)
-
-
-def _delayed(values: Array, samples: int) -> Array:
-    """The values that many samples earlier; the first one where the record does not reach back."""
-    if samples == 0:
-        return values
-    return np.concatenate((np.full(min(samples, values.size), values[0]), values[: max(values.size - samples, 0)]))

@@ -12,21 +12,22 @@ approach is that of structured residuals (Gertler 1998, Fault Detection and Diag
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from hydraulic_interfaces.errors import HydraulicError
-from hydraulic_sim.arrays import Array
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.slots import SLOTS
 from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
 
-from .sensors import SensorErrors
+from .sensor_errors import SensorErrors
 
-RESTART = 5  # samples that the model runs from each measured state
+RUN = 5  # samples that the model runs from each measured state
 
 UNITS = {"force": "N", "flow_a": "m^3/s", "flow_b": "m^3/s", "spool": "1", "supply": "Pa"}
 """Balances in the order of tables, with their SI unit."""
@@ -69,22 +70,21 @@ class Balances:
 
     def __init__(self, model: Model, spool_measured: bool) -> None:
         # A measured spool takes the place of whatever the model says between drive and spool.
-        led = model
+        behind_spool = model
         if spool_measured:
             for name in model.effects:
                 if model.library[name].slot in ("command", "spool"):
-                    led = led.without_effect(name)
-        self.model, self.plant, self.led = model, Plant(model), Plant(led)
+                    behind_spool = behind_spool.without_effect(name)
+        self.model, self.plant, self.flow_plant = model, Plant(model), Plant(behind_spool)
         self.spool_measured = spool_measured
-        self.soft = any(SLOTS[model.library[n].slot].name == "compliance" for n in model.effects)
+        self.compliant = any(SLOTS[model.library[n].slot].name == "compliance" for n in model.effects)
 
     def with_parameters(self, values: dict[str, float]) -> Balances:
         """The same for other parameter values [SI]."""
-        other = object.__new__(Balances)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other.plant = self.plant.with_parameters(values)
-        known = set(self.led.model.keys())
-        other.led = self.led.with_parameters({k: v for k, v in values.items() if k in known})
+        known = set(self.flow_plant.model.keys())
+        other.flow_plant = self.flow_plant.with_parameters({k: v for k, v in values.items() if k in known})
         return other
 
     def form(
@@ -92,108 +92,49 @@ class Balances:
         errors: SensorErrors,
     ) -> Residuals:  # fmt: skip
         """Balances ``names`` of ``channels`` (N,) as measured; `SensorErrors` takes out what the model's sensors do."""
-        read = errors.corrected(channels)
-        x, u = read["position"], channels["drive"]
-        none = np.full(x.shape, np.nan)
-        pa, pb = read.get("pressure_a", none), read.get("pressure_b", none)
-        plant = self.led
-        drive = u
+        seen = states_seen(errors.corrected(channels), to_velocity)
+        x, pa, pb = seen[:, 0], seen[:, 2], seen[:, 3]
+        plant, drive = self.flow_plant, channels["drive"]
         if self.spool_measured:
             drive = np.clip(channels["spool"], -1.0, 1.0) * plant.value("drive_limit")
-        run, n = self._run(plant, drive, dt, x, to_velocity(x), pa, pb)
-        signals = {name: _middle(run[name]) for name in ("pressure_supply", "opening", "spool")}
+        run = _short_runs(plant, drive, dt, seen)
+        n = run["spool"][:, 1:].size
+        signals = {name: _middle(run[name]) for name in ("pressure_supply", "spool")}
         signals["opening"] = run["opening"][:, :-1].reshape(-1)  # held over the interval with the drive
         rows: dict[str, Array] = {}
-        step = np.diff(x)[:n] / dt
         if "force" in names:
-            rows["force"] = self._force(plant, run, x, pa, pb, dt, n)
+            rows["force"] = _force(plant, run, seen, dt, n)
         if plant.model.kind == "hydraulic":
-            signals |= self._capacities(plant, x, pa, pb, drive, dt, n, to_velocity)
-            moved = _rate(run["true_position"], dt)
+            capacities = self._effective_capacities(drive, dt, seen) if self.compliant else _capacities(plant, x, n)
             for side, p, area in (("a", pa, plant.value("piston_area_a")), ("b", pb, -plant.value("piston_area_b"))):
-                capacity = signals[f"capacity_{side}"]
-                signals[f"flow_{side}"] = capacity * _rate(run[f"true_pressure_{side}"], dt) + area * moved
-                if f"flow_{side}" in names:
-                    asked = capacity * np.diff(p)[:n] / dt + area * step
-                    rows[f"flow_{side}"] = asked - signals[f"flow_{side}"]
+                flow, signals[f"capacity_{side}"] = f"flow_{side}", capacities[side]
+                rate, velocity = _rate(run[f"true_pressure_{side}"], dt), _rate(run["true_position"], dt)
+                signals[flow] = capacities[side] * rate + area * velocity
+                if flow in names:
+                    required = capacities[side] * np.diff(p)[:n] / dt + area * np.diff(x)[:n] / dt
+                    rows[flow] = required - signals[flow]
         if "supply" in names or "spool" in names:
-            own = self._own(u, dt, x, to_velocity, pa, pb, n)
+            run = _short_runs(self.plant, channels["drive"], dt, seen)
             if "spool" in names:
-                rows["spool"] = channels["spool"][:n] - own["spool"]
+                rows["spool"] = channels["spool"][:n] - run["spool"][:, :-1].reshape(-1)
             if "supply" in names:
-                measured = 0.5 * (channels["pressure_supply"][1 : n + 1] + channels["pressure_supply"][:n])
-                rows["supply"] = measured - own["pressure_supply"]
-                self._resupply(rows, signals, measured, pa, pb, n)
+                measured = between(channels["pressure_supply"], n)
+                rows["supply"] = measured - _middle(run["pressure_supply"])
+                self._use_measured_supply(rows, signals, measured, pa, pb, n)
         return Residuals(names, np.stack([rows[name] for name in names]), signals)
 
-    def _run(
-        self, plant: Plant, drive: Array, dt: float, x: Array, v: Array, pa: Array, pb: Array
-    ) -> tuple[dict[str, Array], int]:
-        """The model from every fifth measured state on, and how many intervals that makes."""
-        starts = np.arange(0, x.size - RESTART, RESTART)
-        hydraulic = plant.model.kind == "hydraulic"
-        seen = np.stack([x, v, pa if hydraulic else 0.0 * x, pb if hydraulic else 0.0 * x], axis=1)
-        states, memories = plant.track(drive, dt, starts, seen)
-        known = np.isfinite(seen[starts])
-        states[:, :4] = np.where(known, seen[starts], states[:, :4])
-        return plant.predict(drive, dt, starts, RESTART, states, memories), starts.size * RESTART
-
-    def _force(self, plant: Plant, run: dict[str, Array], x: Array, pa: Array, pb: Array, dt: float, n: int) -> Array:
-        mass = plant.value("moving_mass")
-        wide = np.concatenate(([2.0 * x[0] - x[1]], x, [2.0 * x[-1] - x[-2]]))
-        asked = ((wide[3:] - wide[2:-1] - wide[1:-2] + wide[:-3]) / (2.0 * dt * dt))[:n]
-        gap = mass * (asked - _rate(run["velocity"], dt))
-        if plant.model.kind == "hydraulic":
-            # The model's own pressures moved on from the measured ones within the few samples: their part is exchanged.
-            for p, area, name in (
-                (pa, plant.value("piston_area_a"), "true_pressure_a"),
-                (pb, -plant.value("piston_area_b"), "true_pressure_b"),
-            ):
-                gap += area * (_middle(run[name]) - 0.5 * (p[1 : n + 1] + p[:n]))
-        return gap
-
-    def _capacities(
-        self, plant: Plant, x: Array, pa: Array, pb: Array, drive: Array, dt: float, n: int, to_velocity: VelocityFilter
-    ) -> dict[str, Array]:
-        """Oil capacity of each chamber [m³/Pa] at the middle of each interval."""
-        beta, half = plant.value("bulk_modulus"), 0.5 * plant.value("stroke")
-        middle = 0.5 * (x[1 : n + 1] + x[:n])
-        least = 0.01 * min(plant.value("dead_volume_a"), plant.value("dead_volume_b"))
-        found = {}
-        for side, sign in (("a", 1.0), ("b", -1.0)):
-            area = plant.value(f"piston_area_{side}")
-            volume = np.maximum(plant.value(f"dead_volume_{side}") + area * (half + sign * middle), least)
-            found[f"capacity_{side}"] = volume / beta
-        if self.soft:
-            found |= self._softened(plant, x, pa, pb, drive, dt, n, to_velocity)
-        return found
-
-    def _softened(
-        self, plant: Plant, x: Array, pa: Array, pb: Array, drive: Array, dt: float, n: int, to_velocity: VelocityFilter
-    ) -> dict[str, Array]:
+    def _effective_capacities(self, drive: Array, dt: float, seen: Array) -> dict[str, Array]:
         """Capacities of a model with compliance effects: by how much less a pressure rises for a faster piston."""
-        v, nudge = to_velocity(x), 1e-3
-        slow, _ = self._run(plant, drive, dt, x, v - nudge, pa, pb)
-        fast, _ = self._run(plant, drive, dt, x, v + nudge, pa, pb)
+        nudge = np.array([0.0, 1e-3, 0.0, 0.0])
+        slow, fast = (_short_runs(self.flow_plant, drive, dt, seen + change) for change in (-nudge, nudge))
+        moved = (fast["true_position"] - slow["true_position"])[:, 1]
         found = {}
         for side, sign in (("a", 1.0), ("b", -1.0)):
-            p, area = f"true_pressure_{side}", plant.value(f"piston_area_{side}")
-            moved = (fast["true_position"] - slow["true_position"])[:, 1]
-            pressed = (slow[p] - fast[p])[:, 1]
-            found[f"capacity_{side}"] = np.repeat(sign * area * moved / pressed, RESTART)
+            pressed = (slow[f"true_pressure_{side}"] - fast[f"true_pressure_{side}"])[:, 1]
+            found[side] = np.repeat(sign * self.flow_plant.value(f"piston_area_{side}") * moved / pressed, RUN)
         return found
 
-    def _own(
-        self, drive: Array, dt: float, x: Array, to_velocity: VelocityFilter, pa: Array, pb: Array, n: int
-    ) -> dict[str, Array]:
-        """What the model itself says of spool (at the samples) and supply (between them)."""
-        run, _ = self._run(self.plant, drive, dt, x, to_velocity(x), pa, pb)
-        return {
-            "spool": run["spool"][:, :-1].reshape(-1),
-            "pressure_supply": _middle(run["pressure_supply"]),
-        }
-
-    def _resupply(
+    def _use_measured_supply(
         self, rows: dict[str, Array], signals: dict[str, Array], measured: Array, pa: Array, pb: Array, n: int
     ) -> None:
         """Let the flows come from the measured supply pressure instead of the model's."""
@@ -202,16 +143,59 @@ class Balances:
         small, leak = plant.value("orifice_transition"), plant.value("valve_leakage")
         for side, p, sign in (("a", pa, 1.0), ("b", pb, -1.0)):
             if f"flow_{side}" in rows:
-                middle = 0.5 * (p[1 : n + 1] + p[:n])
+                middle = between(p, n)
                 land = gain * (np.maximum(sign * signals["opening"], 0.0) + leak)
                 change = root(measured - middle, small) - root(signals["pressure_supply"] - middle, small)
                 rows[f"flow_{side}"] = rows[f"flow_{side}"] - land * change
         signals["pressure_supply"] = measured
 
 
+def states_seen(read: Mapping[str, Array], to_velocity: VelocityFilter) -> Array:
+    """Position, velocity and both pressures ``(N, 4)`` of channels (N,); NaN where they were not measured."""
+    x = read["position"]
+    missing = np.full(x.shape, np.nan)
+    return np.stack([x, to_velocity(x), read.get("pressure_a", missing), read.get("pressure_b", missing)], axis=1)
+
+
+def runs_from(plant: Plant, drive: Array, dt: float, seen: Array, starts: Index, length: int) -> dict[str, Array]:
+    """Runs of the model over ``length`` samples from the states ``seen`` at each start, the others propagated there."""
+    states, memories = plant.track(drive, dt, starts, seen)
+    states[:, :4] = np.where(np.isfinite(seen[starts]), seen[starts], states[:, :4])
+    return plant.predict(drive, dt, starts, length, states, memories)
+
+
 def root(drop: Array, transition: float) -> Array:
     """√Δp with a finite slope at zero, as the model's orifices have it."""
     return drop / np.sqrt(np.abs(drop) + transition)
+
+
+def _short_runs(plant: Plant, drive: Array, dt: float, seen: Array) -> dict[str, Array]:
+    """From every fifth measured state on."""
+    return runs_from(plant, drive, dt, seen, np.arange(0, len(seen) - RUN, RUN), RUN)
+
+
+def _force(plant: Plant, run: dict[str, Array], seen: Array, dt: float, n: int) -> Array:
+    x = seen[:, 0]
+    wide = np.concatenate(([2.0 * x[0] - x[1]], x, [2.0 * x[-1] - x[-2]]))
+    required = ((wide[3:] - wide[2:-1] - wide[1:-2] + wide[:-3]) / (2.0 * dt * dt))[:n]
+    gap = plant.value("moving_mass") * (required - _rate(run["velocity"], dt))
+    if plant.model.kind == "hydraulic":
+        # The model's own pressures moved on from the measured ones within the few samples: their part is exchanged.
+        for index, area in ((2, plant.value("piston_area_a")), (3, -plant.value("piston_area_b"))):
+            own = run["true_pressure_a" if index == 2 else "true_pressure_b"]
+            gap += area * (_middle(own) - between(seen[:, index], n))
+    return gap
+
+
+def _capacities(plant: Plant, x: Array, n: int) -> dict[str, Array]:
+    """Oil capacity of each chamber [m³/Pa] at the middle of each interval."""
+    beta, half = plant.value("bulk_modulus"), 0.5 * plant.value("stroke")
+    least = 0.01 * min(plant.value("dead_volume_a"), plant.value("dead_volume_b"))
+    found = {}
+    for side, sign in (("a", 1.0), ("b", -1.0)):
+        swept = plant.value(f"piston_area_{side}") * (half + sign * between(x, n))
+        found[side] = np.maximum(plant.value(f"dead_volume_{side}") + swept, least) / beta
+    return found
 
 
 def _rate(run: Array, dt: float) -> Array:
@@ -220,3 +204,8 @@ def _rate(run: Array, dt: float) -> Array:
 
 def _middle(run: Array) -> Array:
     return (0.5 * (run[:, 1:] + run[:, :-1])).reshape(-1)
+
+
+def between(values: Array, n: int) -> Array:
+    """At the middle of the first ``n`` intervals between samples."""
+    return 0.5 * (values[1 : n + 1] + values[:n])

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.data.resampling import delayed
 
 from .recursion import propagate
 
@@ -51,7 +52,7 @@ class Filter:
         """
         whole = int(np.floor(delay + 1e-9))
         part = max(delay - whole, 0.0)
-        early, late = _shifted(values, whole), _shifted(values, whole + 1)
+        early, late = delayed(values, whole), delayed(values, whole + 1)
         first, second = self._integral(1.0 - part), self._integral(part)
         # The older value acts over the first ``part`` of the sample and has then the rest of it to decay.
         aged = expm(self.a * self.step * (1.0 - part)) @ second
@@ -102,10 +103,3 @@ class Filter:
         for k in range(n):
             double[:, n + k] = single[:, k] - double[:, k : n + k] @ lower
         return Derivatives(single, double)
-
-
-def _shifted(values: Array, samples: int) -> Array:
-    """The values that many samples later; the first one where there was none yet."""
-    if samples == 0:
-        return values
-    return np.concatenate((np.full(min(samples, values.size), values[0]), values[: max(values.size - samples, 0)]))

@@ -1,6 +1,9 @@
-"""Basis functions over one variable, and operators with a memory, from which directions are made."""
+"""Basis functions over one variable, their knots, and operators with a memory, from which regressors are made."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -8,11 +11,13 @@ from scipy.signal import lfilter
 
 from hydraulic_sim.arrays import Array
 
+from .plant_signals import Signals
+
 _REACH = 0.995  # quantile of the size at which the outermost knot of a signed variable lies
 
 
-def tents(values: Array, knots: Array) -> Array:
-    """Piecewise linear basis ``(K, n)``: one at its knot, zero at its neighbours; constant beyond the ends."""
+def hat_functions(values: Array, knots: Array) -> Array:
+    """Linear B-splines ``(K, n)``: one at their knot, zero at its neighbours; constant beyond the ends."""
     if knots.size < 2:
         return np.ones((1, values.size))
     inside = np.clip(values, knots[0], knots[-1])
@@ -37,9 +42,37 @@ def even_knots(values: Array, number: int) -> Array:
     return np.unique(np.linspace(low, high, number))
 
 
-def shifted(values: Array, samples: int) -> Array:
-    """The signal ``samples`` ago, its first value before the beginning."""
-    return np.concatenate((np.full(samples, values[0]), values[: values.size - samples]))
+@dataclass(frozen=True)
+class Knots:
+    """Where the curves of all records have their knots [SI]: a curve is one function, whatever the record."""
+
+    velocity: Array
+    position: Array
+    leak_position: Array
+    drive: Array
+    load: Array
+    leak_load: Array
+    pressure: Array
+    time: Array
+
+    @classmethod
+    def of(cls, signals: Sequence[Signals]) -> Knots:
+        """From the signals of all records together."""
+
+        def every(name: str) -> Array:
+            return np.concatenate([getattr(s, name) for s in signals])
+
+        position, load = every("position"), every("load_pressure")
+        return cls(
+            velocity=signed_knots(every("velocity"), 12),
+            position=even_knots(position, 24),
+            leak_position=even_knots(position, 12),
+            drive=np.union1d(signed_knots(every("drive"), 16), even_knots(every("drive"), 48)),
+            load=signed_knots(load, 3),
+            leak_load=signed_knots(load, 6),
+            pressure=even_knots(np.concatenate((every("pressure_a"), every("pressure_b"))), 6),
+            time=even_knots(every("time"), 5),
+        )
 
 
 def lagged(values: Array, dt: float, time: float, begin: float | None = None) -> Array:

@@ -1,28 +1,29 @@
-"""What each subsystem can do to the balances: directions in which its faults move them.
+"""What each subsystem can do to the balances: the regressors that its faults are made of.
 
 None of them is an effect of the library. A subsystem is allowed any smooth function of the variables that its physics
 can depend on, acting where its physics acts: a force in the force balance alone; an opening in both flows, by the root
 of each open land's drop, with opposite signs; leakage by the pressures; oil by the rate of the pressures; the supply in
 the flow of the side that it feeds; a position sensor in both flows by the areas and in the force by the mass. A fault
-that no file of the library knows moves the balances in these directions all the same.
+that no file of the library knows is a sum of these all the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.signal import lfilter
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.effect import arguments
+from hydraulic_sysid.data.resampling import delayed
 
-from .curves import lagged, play, rate_limited, shifted, tents
-from .knots import Knots
-from .signals import Signals
+from .basis import Knots, hat_functions, lagged, play, rate_limited
+from .plant_signals import Signals
 
 LAGS = (1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 32e-3, 64e-3)
-"""Seconds ago that a valve may follow what it was told."""
+"""Seconds by which a valve may follow its drive."""
 _SUPPLY_LAGS = (0.1, 1.0)
 _WIDTHS = (0.003, 0.01, 0.03)
 _UNRESOLVED = (2.0, 6.0)  # standard deviations of the position's noise over which dry friction turns around
@@ -34,20 +35,20 @@ _CREEP = (0.01, 0.03, 0.1)
 
 
 @dataclass
-class Family:
-    """The directions of one subsystem: parallel lists of the variable each goes over, and what it adds per balance."""
+class Regressors:
+    """Those of one subsystem: parallel lists of the variable each is a function of, and what it adds per balance."""
 
     subsystem: str
     variables: list[str] = field(default_factory=list)
     parts: list[dict[str, Array]] = field(default_factory=list)
 
     def add(self, variable: str, **parts: Array) -> None:
-        """One direction; ``parts`` are (n,) by balance."""
+        """One regressor; ``parts`` are (n,) by balance."""
         self.variables.append(variable)
         self.parts.append(parts)
 
 
-def families(s: Signals, balances: tuple[str, ...], k: Knots, waves: Array) -> Iterator[Family]:
+def subsystem_regressors(s: Signals, balances: tuple[str, ...], k: Knots, waves: Array) -> Iterator[Regressors]:
     """All subsystems that these balances can show, one at a time, as each is large.
 
     ``waves`` (W, n) are oscillations that any of them may have.
@@ -70,7 +71,7 @@ def families(s: Signals, balances: tuple[str, ...], k: Knots, waves: Array) -> I
             yield _supply(s, k, waves, True)
 
 
-def turning(s: Signals, noise: float) -> Array:
+def reversal_regressors(s: Signals, noise: float) -> Array:
     """Forces ``(T, n)`` by which laws of dry friction differ while it turns around, none for a model without any.
 
     Within a few times what the position sensor resolves (``noise`` [m]) no motion is seen that would tell one law from
@@ -84,32 +85,32 @@ def turning(s: Signals, noise: float) -> Array:
     early = np.concatenate((s.direction[late:], np.full(late, s.direction[-1])))
     gaps = [times * noise for times in _UNRESOLVED]
     turns = [(s.position - play(s.position, 0.5 * gap)) / gap for gap in gaps]
-    return np.array([early - s.direction, shifted(s.direction, late) - s.direction, *turns])
+    return np.array([early - s.direction, delayed(s.direction, late) - s.direction, *turns])
 
 
-def _force(s: Signals, k: Knots, waves: Array) -> Family:
-    f = Family("force")
+def _force(s: Signals, k: Knots, waves: Array) -> Regressors:
+    f = Regressors("force")
     for wave in waves:
         f.add("frequency", force=wave)
     way = s.direction
-    for tent in tents(s.velocity, k.velocity):
-        f.add("velocity", force=tent)
+    for hat in hat_functions(s.velocity, k.velocity):
+        f.add("velocity", force=hat)
     f.add("direction", force=way)
     f.add("direction", force=np.abs(way))
-    for tent in tents(s.position, k.position):
-        f.add("position", force=tent)
-        f.add("position", force=tent * way)
-    for tent in tents(s.time, k.time):
+    for hat in hat_functions(s.position, k.position):
+        f.add("position", force=hat)
+        f.add("position", force=hat * way)
+    for hat in hat_functions(s.time, k.time):
         for by in (np.ones_like(way), way, s.velocity):
-            f.add("time", force=tent * by)
+            f.add("time", force=hat * by)
     if s.hydraulic:
-        for tent in tents(s.load_pressure, k.load):
-            f.add("load_pressure", force=tent * way)
+        for hat in hat_functions(s.load_pressure, k.load):
+            f.add("load_pressure", force=hat * way)
         f.add("load_pressure", force=s.load_pressure)
         f.add("load_pressure", force=(s.pressure_a + s.pressure_b) * way)
-    f.add("acceleration", force=s.path.acceleration)
+    f.add("acceleration", force=s.motion.acceleration)
     for frequency in _RESONANCES:
-        follow = _resonance(s.path.acceleration, frequency, s.dt)
+        follow = _resonance(s.motion.acceleration, frequency, s.dt)
         f.add("frequency", force=follow)
         f.add("frequency", force=np.gradient(follow))
     for gap in _GAPS:
@@ -122,35 +123,29 @@ def _force(s: Signals, k: Knots, waves: Array) -> Family:
     return f
 
 
-def _opened(s: Signals, family: Family, spool: bool) -> Callable[[str, Array], None]:
-    """Adds a change of opening: in the flows, or where the spool is measured in the spool."""
+def _valve(s: Signals, k: Knots, waves: Array, spool: bool) -> Regressors:
+    f, demand = Regressors("valve"), s.drive
     gain_a, gain_b = s.opening_gains()
 
     def add(variable: str, change: Array) -> None:
-        family.add(variable, flow_a=gain_a * change, flow_b=gain_b * change)
+        """A change of opening: in the flows, or where the spool is measured in the spool."""
+        f.add(variable, flow_a=gain_a * change, flow_b=gain_b * change)
         if spool:
-            family.add(variable, spool=change)
+            f.add(variable, spool=change)
 
-    return add
-
-
-def _valve(s: Signals, k: Knots, waves: Array, spool: bool) -> Family:
-    f = Family("valve")
-    add = _opened(s, f, spool)
-    demand = s.drive
     for wave in waves:
         add("frequency", wave)
-    for tent in tents(demand, k.drive):
-        add("opening", tent)
+    for hat in hat_functions(demand, k.drive):
+        add("opening", hat)
     for lag in LAGS:
-        add("history", shifted(demand, max(1, int(round(lag / s.dt)))) - demand)
+        add("history", delayed(demand, max(1, int(round(lag / s.dt)))) - demand)
     for width in _WIDTHS:
         add("history", play(demand, width) - demand)
     for rate in _RATES:
         add("history", rate_limited(demand, rate * s.dt) - demand)
-    for tent in tents(s.time, k.time):
-        add("time", tent)
-        add("time", tent * demand)
+    for hat in hat_functions(s.time, k.time):
+        add("time", hat)
+        add("time", hat * demand)
     pa, at, pb, bt = s.drops()
     out = demand >= 0.0
     for drop in (np.where(out, pa, pb), np.where(out, bt, at)):
@@ -162,44 +157,46 @@ def _valve(s: Signals, k: Knots, waves: Array, spool: bool) -> Family:
     return f
 
 
-def _drive(s: Signals, k: Knots) -> Family:
+def _drive(s: Signals, k: Knots) -> Regressors:
     """What turns the drive into the force of a mechanical plant."""
-    f = Family("valve")
+    f = Regressors("valve")
     full = s.plant.value("drive_force") * s.plant.value("drive_limit")
-    for tent in tents(s.drive, k.drive):
-        f.add("drive", force=-full * tent)
+    for hat in hat_functions(s.drive, k.drive):
+        f.add("drive", force=-full * hat)
     for lag in LAGS:
-        f.add("history", force=full * (s.drive - shifted(s.drive, max(1, int(round(lag / s.dt))))))
+        f.add("history", force=full * (s.drive - delayed(s.drive, max(1, int(round(lag / s.dt))))))
     for width in _WIDTHS:
         f.add("history", force=full * (s.drive - play(s.drive, width)))
     return f
 
 
-def _flow(s: Signals, k: Knots) -> Family:
-    f = Family("flow")
+def _flow(s: Signals, k: Knots) -> Regressors:
+    f = Regressors("flow")
     load, none = s.load_pressure, np.zeros_like(s.time)
 
     def leak(variable: str, flow: Array) -> None:
         f.add(variable, flow_a=-flow, flow_b=flow)
 
-    for tent in tents(load, k.leak_load):
-        leak("load_pressure", tent)
+    for hat in hat_functions(load, k.leak_load):
+        leak("load_pressure", hat)
     leak("load_pressure", load)
     leak("load_pressure", np.sign(load) * np.sqrt(np.abs(load)))
-    for tent in tents(s.position, k.leak_position):
-        leak("position", tent * load)
-    for tent in tents(s.time, k.time):
-        leak("time", tent * load)
+    for hat in hat_functions(s.position, k.leak_position):
+        leak("position", hat * load)
+    for hat in hat_functions(s.time, k.time):
+        leak("time", hat * load)
     for p, side in ((s.pressure_a, "flow_a"), (s.pressure_b, "flow_b")):
         for shape in (none + 1.0, p, np.sqrt(np.maximum(p, 0.0))):
             f.add("pressure", **{side: -shape})
     return f
 
 
-def _fluid(s: Signals, k: Knots) -> Family:
-    f = Family("fluid")
+def _fluid(s: Signals, k: Knots) -> Regressors:
+    f = Regressors("fluid")
     stored_a, stored_b = -s.capacity_a * s.rate_a, -s.capacity_b * s.rate_b
-    for in_a, in_b in zip(tents(s.pressure_a, k.pressure), tents(s.pressure_b, k.pressure), strict=True):
+    for in_a, in_b in zip(
+        hat_functions(s.pressure_a, k.pressure), hat_functions(s.pressure_b, k.pressure), strict=True
+    ):
         f.add("pressure", flow_a=in_a * stored_a, flow_b=in_b * stored_b)
     for power in (1, 2):
         thin_a, thin_b = (np.maximum(p, 1e5) ** -power for p in (s.pressure_a, s.pressure_b))
@@ -209,20 +206,19 @@ def _fluid(s: Signals, k: Knots) -> Family:
         f.add("history", flow_a=-lagged(s.rate_a, s.dt, time, 0.0), flow_b=-lagged(s.rate_b, s.dt, time, 0.0))
     f.add("rate", flow_a=-s.rate_a)
     f.add("rate", flow_b=-s.rate_b)
-    model = s.plant.model
-    on = set(model.effects)
+    on = s.plant.model.effects
     friction = s.plant.value("viscous_friction.coefficient") if "viscous_friction" in on else 0.0
     leakage = s.plant.value("internal_leakage.coefficient") if "internal_leakage" in on else 0.0
-    for tent in tents(s.time, k.time):
-        f.add("time", flow_a=tent * stored_a, flow_b=tent * stored_b)
+    for hat in hat_functions(s.time, k.time):
+        f.add("time", flow_a=hat * stored_a, flow_b=hat * stored_b)
         if friction or leakage:
-            thinner = leakage * tent * s.load_pressure
-            f.add("time", force=-friction * tent * s.velocity, flow_a=thinner, flow_b=-thinner)
+            thinner = leakage * hat * s.load_pressure
+            f.add("time", force=-friction * hat * s.velocity, flow_a=thinner, flow_b=-thinner)
     return f
 
 
-def _supply(s: Signals, k: Knots, waves: Array, measured: bool) -> Family:
-    f = Family("supply")
+def _supply(s: Signals, k: Knots, waves: Array, measured: bool) -> Regressors:
+    f = Regressors("supply")
     supply_a, supply_b = s.supply_gains()
     tank_a, tank_b = s.tank_gains()
     drawn = np.maximum(np.maximum(s.flow_a, s.flow_b), 0.0)
@@ -235,8 +231,8 @@ def _supply(s: Signals, k: Knots, waves: Array, measured: bool) -> Family:
         other = by_drawn if by_returned is None else by_returned
         f.add(variable, flow_a=tank_a * other, flow_b=tank_b * other)
 
-    for tent in tents(s.time, k.time):
-        add("time", tent)
+    for hat in hat_functions(s.time, k.time):
+        add("time", hat)
     for wave in waves:
         add("frequency", wave)
     add("flow", drawn, returned)
@@ -246,8 +242,8 @@ def _supply(s: Signals, k: Knots, waves: Array, measured: bool) -> Family:
     return f
 
 
-def _sensor(s: Signals, k: Knots, waves: Array) -> Family:
-    f = Family("sensor")
+def _sensor(s: Signals, k: Knots, waves: Array) -> Regressors:
+    f = Regressors("sensor")
     mass = s.plant.value("moving_mass")
     area_a = s.plant.value("piston_area_a") if s.hydraulic else 0.0
     area_b = s.plant.value("piston_area_b") if s.hydraulic else 0.0
@@ -256,35 +252,35 @@ def _sensor(s: Signals, k: Knots, waves: Array) -> Family:
         """An error of the position whose derivatives are ``rate`` and ``change``."""
         f.add(variable, force=mass * change, flow_a=area_a * rate, flow_b=-area_b * rate)
 
-    for tent in tents(s.position, k.position):
-        add("position", tent * s.path.velocity, tent * s.path.acceleration)
+    for hat in hat_functions(s.position, k.position):
+        add("position", hat * s.motion.velocity, hat * s.motion.acceleration)
     for wave in waves:
         rate = np.gradient(wave, s.dt)
         add("frequency", rate, np.gradient(rate, s.dt))
-    add("acceleration", s.path.acceleration, s.path.jerk)
-    add("acceleration", s.path.jerk, np.gradient(s.path.jerk, s.dt))
+    add("acceleration", s.motion.acceleration, s.motion.jerk)
+    add("acceleration", s.motion.jerk, np.gradient(s.motion.jerk, s.dt))
     for frequency in _RESONANCES:
-        sway = _resonance(s.path.acceleration, frequency, s.dt)
+        sway = _resonance(s.motion.acceleration, frequency, s.dt)
         rate = np.gradient(sway, s.dt)
         change = np.gradient(rate, s.dt)
         add("frequency", rate, change)
         add("frequency", change, np.gradient(change, s.dt))
     for gap in _GAPS:
         within = np.abs(s.position - play(s.position, 0.5 * gap)) < 0.499 * gap
-        add("reversal", within * s.path.velocity, within * s.path.acceleration)
-    for tent in tents(s.time, k.time):
-        add("time", tent, np.zeros_like(tent))
+        add("reversal", within * s.motion.velocity, within * s.motion.acceleration)
+    for hat in hat_functions(s.time, k.time):
+        add("time", hat, np.zeros_like(hat))
     if s.hydraulic:
         _pressure_sensors(s, f, area_a, area_b)
     return f
 
 
-def _pressure_sensors(s: Signals, f: Family, area_a: float, area_b: float) -> None:
+def _pressure_sensors(s: Signals, f: Regressors, area_a: float, area_b: float) -> None:
     supply_a, supply_b = s.supply_gains()
     tank_a, tank_b = s.tank_gains()
     sides = (
-        ("flow_a", -area_a, s.pressure_a, s.path.rate_a, s.capacity_a, supply_a + tank_a),
-        ("flow_b", area_b, s.pressure_b, s.path.rate_b, s.capacity_b, supply_b + tank_b),
+        ("flow_a", -area_a, s.pressure_a, s.motion.rate_a, s.capacity_a, supply_a + tank_a),
+        ("flow_b", area_b, s.pressure_b, s.motion.rate_b, s.capacity_b, supply_b + tank_b),
     )
     still = np.zeros_like(s.time)
     for flow, area, pressure, rate, capacity, slope in sides:
@@ -295,8 +291,6 @@ def _pressure_sensors(s: Signals, f: Family, area_a: float, area_b: float) -> No
 
 def _resonance(signal: Array, frequency: float, dt: float) -> Array:
     """What a second mass on a lightly damped spring of this frequency does in answer (static gain 1)."""
-    from scipy.signal import lfilter
-
     turn = 2.0 * np.pi * frequency * dt
     poles = [1.0, -2.0 * np.exp(-0.1 * turn) * np.cos(turn), np.exp(-0.2 * turn)]
     return lfilter([sum(poles)], poles, signal)

@@ -1,10 +1,10 @@
-"""Noise of the balances: how it is thinned out, and the filter that makes it white.
+"""Noise of the balances: how it is decimated, and the filter that makes it white.
 
 A balance at full rate is mostly noise, as it holds second differences of a position. It is smoothed by three running
-means and thinned to some 200 per second: the cubic spline as a modulating function (Maletinsky 1979, IFAC Symposium on
-Identification 5), which acts on every term of a balance alike. What noise is left is coloured, and shared by the
-balances. A vector autoregression fitted to it, as the twin shows it, turns the balances into rows of independent
-samples of variance one, which is what least squares, χ² and bounds of correlations ask for.
+means and decimated to some 200 samples per second: the cubic spline as a modulating function (Maletinsky 1979, IFAC
+Symposium on Identification 5), which acts on every term of a balance alike. What noise is left is coloured, and shared
+by the balances. A vector autoregression fitted to it, as a reference run shows it, turns the balances into rows of
+independent samples of variance one, which is what least squares, χ² and bounds of correlations ask for.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ ORDER = 10  # of the autoregression: 50 ms, beyond the memory of a second differ
 _RIDGE = 1e-9
 
 
-def thinning(dt: float) -> int:
+def decimation_factor(dt: float) -> int:
     """Samples per sample that is kept."""
     return max(1, int(round(1.0 / (RATE * dt))))
 
 
-def thin(values: Array, factor: int) -> Array:
+def decimate(values: Array, factor: int) -> Array:
     """Smooth ``(…, n)`` by the cubic spline of width 3·factor samples and keep every factor-th: ``(…, m)``."""
     if factor == 1:
         return values
@@ -43,7 +43,7 @@ class Whitener:
 
     @classmethod
     def of(cls, noise: Array) -> Whitener:
-        """From thinned noise ``(B, m)`` of all balances, by least squares."""
+        """From decimated noise ``(B, m)`` of all balances, by least squares."""
         size, count = noise.shape
         spread = noise.std(axis=1)
         scaled = noise / spread[:, None]
@@ -62,7 +62,7 @@ class Whitener:
         return cls(weights / spread)
 
     def __call__(self, values: Array, rows: tuple[int, ...] | None = None) -> Array:
-        """Whiten thinned ``(…, b, m)`` into ``(…, B, m − order)``; ``rows``: which balances these b are."""
+        """Whiten decimated ``(…, b, m)`` into ``(…, B, m − order)``; ``rows``: which balances these b are."""
         chosen = self.weights if rows is None else self.weights[:, :, list(rows)]
         order, count = len(chosen) - 1, values.shape[-1]
         out = 0.0

@@ -1,8 +1,8 @@
-"""Cross-validated least squares of whitened balances on directions, from their moments.
+"""Cross-validated least squares of whitened balances on regressors, from normal equations summed per fold.
 
-The coefficients of the first directions, those of the model's free parameters, stay within bounds. Half-second blocks
-are left out in turn, in four folds: a direction counts as far as it holds on data that did not make it, which charges a
-family for its number of directions, the more the larger and the slower the error is that it cannot explain.
+The coefficients of the first regressors, those of the model's free parameters, stay within bounds. Half-second blocks
+are left out in turn, in four folds: a regressor counts as far as it holds on data that did not make it, which charges a
+subsystem for its number of regressors, the more the larger and the slower the error is that it cannot explain.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from hydraulic_sim.arrays import Array, Index
 FOLDS = 4
 BLOCK_SECONDS = 0.5
 RIDGES = (1e-6, 1e-4, 1e-2, 1e-1, 1.0, 10.0)
-"""Shrinking of directions that are tried, of their power; the best one counts."""
-_FIRM = 1e-6  # of parameters and of directions that were taken before
-_SEEN = 0.1  # part of a direction's power outside the fold left out, from which it is fitted
+"""Shrinkage of regressors that are tried, of their power; the best one counts."""
+_FIRM = 1e-6  # of parameters and of regressors that were taken before
+_SEEN = 0.1  # part of a regressor's power outside the fold left out, from which it is fitted
 
 
 @dataclass(frozen=True)
-class Moments:
-    """Sums of products of the directions (K) and the balances, per fold.
+class NormalEquations:
+    """Sums of products of the regressors (K) and the balances, per fold.
 
     ``gram`` (FOLDS, K, K), ``cross`` (FOLDS, K), ``square`` (FOLDS,), ``count`` (FOLDS,) samples of all balances.
     """
@@ -36,27 +36,26 @@ class Moments:
     count: Array
 
     @classmethod
-    def of(cls, directions: Array, balances: Array, rate: float) -> Moments:
-        """From whitened directions ``(K, B, m)`` and balances ``(B, m)`` at ``rate`` samples per second."""
-        size, _, length = directions.shape
+    def of(cls, regressors: Array, balances: Array, rate: float) -> NormalEquations:
+        """From whitened regressors ``(K, B, m)`` and balances ``(B, m)`` at ``rate`` samples per second."""
+        size, _, length = regressors.shape
         fold = (np.arange(length) // max(1, int(round(BLOCK_SECONDS * rate)))) % FOLDS
         gram, cross = np.empty((FOLDS, size, size)), np.empty((FOLDS, size))
         square, count = np.empty(FOLDS), np.empty(FOLDS)
         for k in range(FOLDS):
-            part = np.ascontiguousarray(directions[:, :, fold == k]).reshape(size, -1)
+            part = np.ascontiguousarray(regressors[:, :, fold == k]).reshape(size, -1)
             own = balances[:, fold == k].reshape(-1)
             gram[k], cross[k], square[k], count[k] = part @ part.T, part @ own, own @ own, own.size
         return cls(gram, cross, square, count)
 
-    def __add__(self, other: Moments) -> Moments:
-        return Moments(
-            self.gram + other.gram, self.cross + other.cross, self.square + other.square, self.count + other.count
-        )
+    def __add__(self, other: NormalEquations) -> NormalEquations:
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return NormalEquations(*(mine + theirs for mine, theirs in pairs))
 
     def left(self, taken: Index, tried: Index, low: Array, high: Array) -> float:
-        """Sum of squares that directions leave on the folds that they were not fitted to.
+        """Sum of squares that regressors leave on the folds that they were not fitted to.
 
-        The first directions of all, as many as there are bounds ``low`` … ``high``, always take part; ``taken`` and
+        The first regressors of all, as many as there are bounds ``low`` … ``high``, always take part; ``taken`` and
         ``tried`` are others, of which those ``tried`` are shrunk as suits them best.
         """
         bounded = low.size
@@ -71,7 +70,7 @@ class Moments:
         totals = np.full(len(ridges), float(self.square.sum()))
         for k in range(FOLDS):
             train = whole - grams[k]
-            # A direction that hardly any but the fold left out has seen cannot be judged: it gets no weight.
+            # A regressor that hardly any but the fold left out has seen cannot be judged: it gets no weight.
             seen = np.diag(train) > _SEEN * np.diag(whole)
             scale = np.sqrt(np.where(seen, np.diag(whole), np.inf))
             train /= np.outer(scale, scale)
@@ -85,7 +84,7 @@ class Moments:
 
 
 def _times(bound: Array, scale: Array) -> Array:
-    """Bounds in units of the scaled directions; one without any power may do what it likes."""
+    """Bounds in units of the scaled regressors; one without any power may do what it likes."""
     return np.where(np.isfinite(scale), bound * np.where(np.isfinite(scale), scale, 1.0), np.sign(bound))
 
 

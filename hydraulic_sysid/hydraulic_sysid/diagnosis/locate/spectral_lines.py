@@ -11,7 +11,7 @@ from hydraulic_sim.arrays import Array
 
 _MOST = 3  # lines
 _HEIGHT = 12.0  # of the median over records, above the spectrum around: noise reaches 5 in 10⁴ frequencies
-_AROUND = 41  # lines of the spectrum whose median is the level around
+_AROUND = 41  # lines of the spectrum around, over whose median a line stands
 _LOWEST = 0.3  # Hz
 _PADDED = 4  # times as many frequencies as samples give: their phase must hold over a record
 _FEWEST = 2  # records: in a single one a line may be that of the excitation

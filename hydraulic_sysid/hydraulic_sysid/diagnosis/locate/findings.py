@@ -1,4 +1,4 @@
-"""What a location says, in sentences that carry their figures."""
+"""What the balances say, in sentences that carry their figures."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 from hydraulic_sysid.data.display import first_upper, number, quantity
 
-from .blame import PARAMETERS
+from .attribution import PARAMETERS
 
 EXPLAINED = 1.1
-"""Mean square over that of an exact model up to which nothing is left to blame."""
+"""Mean square over that of an exact model up to which nothing is left to attribute."""
 CLOSE = 2.0
 _WORTH = 0.05  # share from which a second subsystem is named
 _VIOLATED = 1.15  # RMS over noise from which a balance is called violated
@@ -23,10 +23,10 @@ PLACES = {
     "sensor": "a sensor",
     PARAMETERS: "a parameter",
 }
-OVER = {
+VARIABLES = {
     "velocity": "velocity", "direction": "the direction of motion", "position": "position", "time": "time",
     "load_pressure": "the load pressure", "acceleration": "acceleration", "frequency": "frequency (a resonance)",
-    "reversal": "the way since the last reversal", "opening": "the opening", "history": "what the drive was before",
+    "reversal": "travel since the last reversal", "opening": "the opening", "history": "the drive's past",
     "pressure": "the pressures", "rate": "the rate of the pressures", "flow": "the flow drawn", "drive": "the drive",
 }  # fmt: skip
 
@@ -43,21 +43,20 @@ def findings(result: dict[str, Any]) -> list[dict[str, Any]]:
             found.append({"balance": b["name"], "kind": "at_noise", "text": text, "numbers": numbers})
             continue
         text += f", {number(b['ratio'])} times its noise of {noise}"
-        over = b.get("explained_by", [])
-        if over:
-            share = 100.0 * float(over[0]["explained"])
-            text += f"; {OVER.get(over[0]['variable'], over[0]['variable'])} alone explains {share:.0f} % of it"
-            numbers |= {"variable": over[0]["variable"], "explained": over[0]["explained"]}
+        if b.get("explained_by"):
+            best, explained = b["explained_by"][0]["variable"], b["explained_by"][0]["explained"]
+            text += f"; {VARIABLES.get(best, best)} alone explains {100.0 * explained:.0f} % of it"
+            numbers |= {"variable": best, "explained": explained}
         found.append({"balance": b["name"], "kind": "violated", "text": text + ".", "numbers": numbers})
     for s in result["attribution"]:
-        if s["share"] < _WORTH or _over(result) <= EXPLAINED:
+        if s["share"] < _WORTH or _ratio(result) <= EXPLAINED:
             continue
         best = next(iter(s["variables"]), None)
         text = (
             f"{first_upper(PLACES[s['name']])}: {100.0 * s['share']:.0f} % of what the model lacks in its balances"
-            f" ({100.0 * s['alone']:.0f} % if nothing else is blamed)"
+            f" ({100.0 * s['alone']:.0f} % alone)"
         )
-        text += f", mostly over {OVER.get(best, best)}." if best else "."
+        text += f", mostly as a function of {VARIABLES.get(best, best)}." if best else "."
         numbers = {"share": s["share"], "alone": s["alone"]}
         found.append({"balance": None, "kind": "attribution", "subsystem": s["name"], "text": text, "numbers": numbers})
     for missing in (m for m in result["not_formed"] if m["name"] in _BASIC):
@@ -72,28 +71,28 @@ def verdict(result: dict[str, Any]) -> dict[str, str]:
     if misfit is None:
         return {
             "level": "off",
-            "text": "These records allow no balance: drive and position alone do not tell forces from flows. "
+            "text": "These records allow no balance: drive and position alone cannot distinguish forces from flows. "
             "Measure the pressures of both chambers to locate a fault.",
         }
-    over = _over(result)
-    if over <= EXPLAINED:
+    ratio = _ratio(result)
+    if ratio <= EXPLAINED:
         return {
             "level": "explained",
-            "text": f"All balances hold to within their noise: mean square {number(over)} times an exact model's.",
+            "text": f"All balances hold to within their noise: mean square {number(ratio)} times an exact model's.",
         }
-    blamed = [s for s in result["attribution"] if s["share"] >= _WORTH]
-    level = "close" if over <= CLOSE else "off"
-    text = f"The balances miss {number(over)} times the mean square that noise explains"
-    if not blamed:
+    responsible = [s for s in result["attribution"] if s["share"] >= _WORTH]
+    level = "close" if ratio <= CLOSE else "off"
+    text = f"The mean square of the balances is {number(ratio)} times what noise explains"
+    if not responsible:
         return {"level": level, "text": text + "; no subsystem explains it."}
-    parts = [f"{PLACES[s['name']]} ({100.0 * s['share']:.0f} %)" for s in blamed]
-    text = f"{text}. It belongs to {' and '.join(parts[:3])}."
-    tied = [PLACES[s["name"]] for s in result["attribution"] if s["indistinguishable"] and s is not blamed[0]]
-    if tied and blamed[0]["indistinguishable"]:
-        text += f" These records hardly tell that from {' or '.join(tied)}."
+    parts = [f"{PLACES[s['name']]} ({100.0 * s['share']:.0f} %)" for s in responsible]
+    text = f"{text}. Responsible: {' and '.join(parts[:3])}."
+    alike = [PLACES[s["name"]] for s in result["attribution"] if s["indistinguishable"] and s is not responsible[0]]
+    if alike and responsible[0]["indistinguishable"]:
+        text += f" These records hardly distinguish that from {' or '.join(alike)}."
     return {"level": level, "text": text}
 
 
-def _over(result: dict[str, Any]) -> float:
+def _ratio(result: dict[str, Any]) -> float:
     """Mean square of the balances, parameters moved, over that of an exact model."""
     return float(result["misfit"]["refitted"] / result["misfit"]["exact_model"])
