@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hostile_page import assert_cannot_inject
 
 from hydraulic_bringup.paper import printed, study
 from hydraulic_bringup.verbs import paper
@@ -81,6 +82,7 @@ def test_the_papers_figures_stand_beside_ours(run: Any) -> None:
     assert len(run[1]["left_out"]) == len(printed.LEFT_OUT)
     page = (run[0] / "report.html").read_text(encoding="utf-8")
     assert "Excitation from the bandwidth" in page and "What the paper leaves out" in page
+    assert_cannot_inject(run[1])
 
 
 def test_the_models_are_left_for_the_controller(run: Any) -> None:

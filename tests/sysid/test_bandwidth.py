@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_page import assert_cannot_inject
 
 from hydraulic_node_utils.cli import run_verb
 from hydraulic_sim.linear import closed_form
@@ -103,6 +104,7 @@ def test_the_verb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     document = json.loads((tmp_path / "b" / "bandwidth.json").read_text())
     assert document["position_bandwidth"] == pytest.approx(from_model(load_model(BENCH)).position)
     assert document["excitation_band"][1] == pytest.approx(2.0 * document["position_bandwidth"])
+    assert_cannot_inject(document)
     assert "position, closed loop" in capsys.readouterr().out
     assert run_verb("hydraulic_sysid", ["bandwidth", "--out", str(tmp_path / "c")]) == 2
     assert "either a --model or a --record" in capsys.readouterr().err

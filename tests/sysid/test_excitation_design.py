@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_page import assert_cannot_inject
 
 from hydraulic_node_utils.cli import run_verb
 from hydraulic_sim.model_file import load_model
@@ -153,6 +154,7 @@ def test_the_plan_file_holds_its_prediction(model, tmp_path: Path, capsys: pytes
     document = json.loads((out / "design.json").read_text())
     assert document["limits"]["travel"] == 0.05
     assert document["plans"][0]["crest_factor"] < 2.0
+    assert_cannot_inject(document)
     assert run_verb("hydraulic_sysid", [*arguments, "--out", str(out)]) == 2
     assert "a plan is never overwritten" in capsys.readouterr().err
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_page import assert_cannot_inject
 from scipy import signal
 
 from hydraulic_node_utils.cli import run_verb
@@ -221,6 +222,8 @@ def test_the_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.Captur
     documents = [json.loads((tmp_path / n / "frequency_response.json").read_text()) for n in ("bla", "welch")]
     assert [d["method"] for d in documents] == ["bla", "welch"]
     assert documents[1]["levels_db"] is None
+    for document in documents:
+        assert_cannot_inject(document)
     assert "Plotly" in (tmp_path / "bla" / "report.html").read_text(encoding="utf-8")
     assert run_verb("hydraulic_sysid", [*arguments, "--output", "pressure_a", "--out", str(tmp_path / "none")]) == 2
     assert "no channel 'pressure_a'" in capsys.readouterr().err

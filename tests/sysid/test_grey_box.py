@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_page import assert_cannot_inject
 
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
@@ -107,6 +108,7 @@ def test_the_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.Captur
     assert result["schema"] == "hydraulic_sysid.greybox/2"
     assert result["channels"]["velocity"]["shares"]["nonlinear"] > 0.5
     assert "What is left" in (tmp_path / "report.html").read_text()
+    assert_cannot_inject(result)
     assert " ".join(result["verdict"]["text"].split()) in " ".join(capsys.readouterr().out.split())
     assert greybox.main([*arguments, "--out", str(tmp_path), "--json"]) == 0
     assert "traces" not in capsys.readouterr().out

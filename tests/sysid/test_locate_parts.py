@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_page import assert_cannot_inject
 from scipy.optimize import lsq_linear
 
 from hydraulic_sysid.diagnosis.locate.attribution import PARAMETERS, attribute
@@ -131,6 +132,7 @@ def test_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.CaptureFix
     assert document["attribution"][0]["name"] == "valve"
     page = (tmp_path / "report.html").read_text()
     assert document["verdict"]["text"] in page and "Which balance is violated" in page
+    assert_cannot_inject(document)
     assert main([*call, "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown["verdict"] == document["verdict"] and "error_maps" not in shown["balances"][0]

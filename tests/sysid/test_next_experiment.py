@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_page import assert_cannot_inject
 
 from hydraulic_sim.model import Entry, Model
 from hydraulic_sim.model_file import load_model, save_model
@@ -133,6 +134,7 @@ def test_the_document_and_its_page(proposal: Proposal) -> None:
     assert chosen["separation"] >= 0.95 * max(o["separation"] for o in others)
     page = render([document])
     assert "Where their predictions part" in page and OTHER in page
+    assert_cannot_inject(document)
 
 
 def test_a_refit_takes_away_what_free_parameters_explain(base: Model) -> None:

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hostile_page import assert_cannot_inject
 
 from hydraulic_sim.model_file import load_model
+from hydraulic_sysid import report
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.diagnosis.compare import compare
@@ -105,13 +107,23 @@ def test_every_figure_function_makes_one(comparison: dict[str, Any], folder: Pat
     assert all(f.data for f in made)
 
 
-def test_names_from_the_document_cannot_become_html(comparison: dict[str, Any]) -> None:
-    hostile = json.loads(json.dumps(comparison))
-    hostile["model"]["name"] = "</title><script>alert(1)</script>"
-    hostile["records"][0]["name"] = "</script><b>x"
-    html = render([hostile])
-    assert "<script>alert(1)" not in html
-    assert "</script><b>x" not in html
+def test_no_text_of_a_document_can_become_html(comparison: dict[str, Any], folder: Path) -> None:
+    assert_cannot_inject({**comparison, "records": comparison["records"][:1]})
+    assert_cannot_inject(results.read_result(folder / "identify.json"))
+
+
+def test_figures_show_tags_of_a_document_as_text(comparison: dict[str, Any]) -> None:
+    record = {**comparison["records"][0], "name": "<b>x"}
+    hostile = {**comparison, "channels": {"position": {"unit": "<i>m", "title": "<b>a</b>&"}}}
+    titles = [axis.title.text for axis in compare_figures.overlay(hostile, record).select_yaxes()]
+    assert "&lt;b&gt;a&lt;/b&gt;&amp;<br>[&lt;i&gt;m]" in titles
+
+
+def test_templates_escape_everything_and_know_every_name() -> None:
+    templates = [p for p in Path(report.__file__).parent.rglob("*.j2")]
+    assert len(templates) > 15
+    for template in templates:
+        assert not re.search(r"\|\s*(safe|default)\b|autoescape", template.read_text(encoding="utf-8")), template
 
 
 def test_document_has_no_number_that_json_does_not_know(folder: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_page import assert_cannot_inject
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
@@ -51,6 +52,7 @@ def test_grid_and_records_in_one_document_and_on_one_page(files: list[str], tmp_
     assert one_step["residual_tests"]["confidence"] == 0.99
     page = (tmp_path / "report.html").read_text()
     assert "Validation of identified models" in page and "good fits best" in page
+    assert_cannot_inject(result)
     printed = " ".join(capsys.readouterr().out.split())
     assert "square 3 V 1 Hz" in printed and result["verdict"]["text"] in printed
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hostile_page import assert_cannot_inject
 
 from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.report import render
 from hydraulic_sysid.verbs.add import main as add_main
 from hydraulic_sysid.verbs.diagnose import main as diagnose_main
 
@@ -58,6 +61,39 @@ def test_the_page_shows_what_the_document_holds(run: Path) -> None:
     page = (run / "report.html").read_text()
     for word in ("The error falls", "Before and after", "Competing models", "valve_deadband"):
         assert word in page
+    assert_cannot_inject(json.loads((run / "diagnose.json").read_text()))
+
+
+CURVE = {
+    "place": "valve",
+    "subsystem": "valve",
+    "summary": "opening of any shape",
+    "variable": "size_of_opening",
+    "unit": "1",
+    "explained_share": 0.4,
+    "knots": [0.0, 0.5, 1.0],
+    "value": [0.0, 0.1, 0.1],
+    "low": [-0.1, 0.0, 0.0],
+    "high": [0.1, 0.2, 0.2],
+}
+OUTSIDE = {"nonparametric_curves": [CURVE], "nearest_effects": ["backlash"]}
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "words"),
+    [
+        ("outside the library", OUTSIDE, "The shape of what is left; 40.0\u00a0%; library: backlash; Write an effect"),
+        ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
+        ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
+    ],
+)
+def test_the_page_of_every_verdict_says_what_to_do(run: Path, kind: str, change: dict[str, Any], words: str) -> None:
+    document = json.loads((run / "diagnose.json").read_text())
+    document["verdict"]["kind"] = kind
+    if kind == "complete":
+        document["residual"]["after_each_effect"] = []
+    page = render([{**document, **change}])
+    assert [word for word in words.split("; ") if word not in page] == []
 
 
 def test_a_model_is_never_overwritten(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,6 +110,7 @@ def test_add_fits_an_effect_and_says_whether_the_data_bear_it_out(
     done = json.loads(capsys.readouterr().out)
     assert done["verdict"]["kind"] == "confirmed"
     assert [r["name"] for r in done["records"] if r["role"] == "validation"]
+    assert_cannot_inject(json.loads((tmp_path / "right" / "add.json").read_text()))
     assert done["residual"]["after"]["validation"] < 0.2 * done["residual"]["before"]["validation"]
     assert "valve_deadband" in load_model(tmp_path / "right" / "model.yaml").effects
     assert add_main(["no_such_effect", *command, "--out", str(tmp_path / "none")]) == 2
