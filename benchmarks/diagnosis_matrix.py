@@ -2,7 +2,7 @@
 
     ./bench shell -- python benchmarks/diagnosis_matrix.py [--only EFFECT …] [--kind KIND] [--severity mild|strong]
 
-Benches come from the independent plant in tests/hidden_effects. Each bench's outcome is kept as one JSON document in
+Benches come from the independent plant in hidden_effects/. Each bench's outcome is kept as one JSON document in
 the folder, and a run continues where it was ended. With --doc the page docs/diagnosis-matrix.md is written; with
 --write FOLDER the benches themselves (records, the user's model file, the answer), and nothing is diagnosed.
 """
@@ -13,11 +13,9 @@ import argparse
 import sys
 from pathlib import Path
 
+from hidden_effects import benches, matrix
+
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
-
-from hidden_effects import benches, matrix  # noqa: E402
-
 PAGE = ROOT / "docs" / "diagnosis-matrix.md"
 
 

@@ -195,7 +195,7 @@ def document(found: list[dict[str, Any]], command: str, catalogued: int) -> str:
     lines = [
         "# Diagnosis on benches with hidden effects",
         "",
-        "Every bench is a plant that shares nothing with this project's simulator (`tests/hidden_effects/`):",
+        "Every bench is a plant that shares nothing with this project's simulator (`benchmarks/hidden_effects/`):",
         "another solver, other laws for the same physics, noise, quantisation, and as-built values within 5 % of the",
         "data sheet. The diagnosis sees six records of 20 s and a model file without the hidden effects. Errors on",
         "held-out data are measured on records of the same bench that the diagnosis never saw. Made by",
