@@ -13,8 +13,8 @@ from hydraulic_sim.model_file import Model, load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.decimation import envelope
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.diagnosis.compare import ComparisonError, Settings, compare
-from hydraulic_sysid.diagnosis.compare.errormaps import Binning, error_map, folds_of, independent_samples
+from hydraulic_sysid.diagnosis.compare import ComparisonError, compare
+from hydraulic_sysid.diagnosis.compare.error_maps import Binning, error_map, folds_of, independent_samples
 from hydraulic_sysid.diagnosis.compare.spectra import amplitude_density, noise_density
 from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
 
@@ -132,7 +132,7 @@ def test_what_cannot_be_compared_is_named(model: Model) -> None:
     with pytest.raises(ComparisonError, match="no channel 'position'"):
         compare(model, [without])
     with pytest.raises(ComparisonError, match="shorter than ten samples"):
-        compare(model, [record], Settings(horizon=0.005))
+        compare(model, [record], horizon=0.005)
     with pytest.raises(ComparisonError, match="no record"):
         compare(model, [])
 

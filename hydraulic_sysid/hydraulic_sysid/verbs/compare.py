@@ -16,7 +16,7 @@ from rich.table import Table
 from hydraulic_node_utils import tables
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.display import first_upper, number, quantity
-from hydraulic_sysid.diagnosis.compare import Settings, compare
+from hydraulic_sysid.diagnosis.compare import compare
 from hydraulic_sysid.diagnosis.compare.findings import AT_FLOOR
 from hydraulic_sysid.verbs import _options as opt
 
@@ -40,7 +40,7 @@ def main(argv: list[str] | None = None) -> int:
 def _compare(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     model = load_model(options.model)
     records = opt.read_records(options)
-    return opt.Done(compare(model, records, Settings(horizon=options.horizon), lambda name: say(f"comparing {name}")))
+    return opt.Done(compare(model, records, options.horizon, lambda name: say(f"comparing {name}")))
 
 
 def _show(result: dict[str, Any], console: Console) -> None:

@@ -1,6 +1,6 @@
 """A nonlinear model beside measurements: predictions, errors, where they sit, and what that says in words."""
 
-from .comparison import Settings, compare
+from .comparison import compare
 from .prediction import ComparisonError
 
-__all__ = ["ComparisonError", "Settings", "compare"]
+__all__ = ["ComparisonError", "compare"]

@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import TITLES, number, percent
@@ -18,13 +16,13 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.estimation import noise
 
-from . import errormaps, findings
+from . import findings
 from .channels import UNITS
 from .document import model_document, record_document
-from .errormaps import ErrorMap
+from .error_maps import DIRECTION_EDGES, Binning, ErrorMap, directions, error_map, folds_of, independent_samples
 from .findings import Finding
 from .prediction import TILES, ComparisonError, check
-from .run import MODES, Compared, run
+from .reference_run import MODES, Compared, run
 from .spectra import SEGMENT_SECONDS
 
 Progress = Callable[[str], None]
@@ -38,46 +36,33 @@ _CLOSE = 0.1  # relative error up to which a model that is not exact is called c
 _SECOND = 0.8  # a second variable is named if it explains at least this part of what the first explains
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What a user may choose about a comparison."""
-
-    horizon: float = 0.5
-    """Seconds ahead of the finite-horizon prediction."""
-    trace_points: int = 1400
-    """Points kept of each trace for the plots."""
-
-
 def compare(
-    model: Model, records: Sequence[Record], settings: Settings | None = None, progress: Progress | None = None
+    model: Model, records: Sequence[Record], horizon: float = 0.5, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Result document of a model set against records; arrays are NumPy, SI.
 
-    ``progress`` is called with the name of each record as its turn comes.
+    ``horizon``: seconds ahead of the finite-horizon prediction. ``progress`` is called with the name of each record as
+    its turn comes.
 
     :raises ComparisonError: no record, or one that lacks what a comparison needs.
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run over a record.
     """
-    settings = settings or Settings()
     if not records:
         raise ComparisonError("there is no record to compare with")
     for record in records:
-        check(record, settings.horizon)
+        check(record, horizon)
     plant = Plant(model)
-    compared = _run_all(model, plant, records, settings, progress)
+    compared = _run_all(model, plant, records, horizon, progress)
     channels = [name for name in UNITS if any(name in c.data.compared for c in compared)]
-    maps = error_maps(compared, channels)
-    documents = [
-        {**record_document(c, settings.trace_points), "error_maps": _plain_maps(error_maps([c], c.data.compared))}
-        for c in compared
-    ]
+    maps = _maps(compared, channels)
+    documents = [{**record_document(c), "error_maps": _plain_maps(_maps([c], c.data.compared))} for c in compared]
     summary = {name: _pooled(documents, name) for name in channels}
-    found = _findings(documents, summary, maps, settings)
+    found = _findings(documents, summary, maps, horizon)
     return {
         **heading("compare", 2),
         "model": model_document(model),
         "settings": {
-            "horizon": settings.horizon,
+            "horizon": horizon,
             "horizon_part": 1.0 / TILES,
             "velocity_filter": "Savitzky–Golay derivative of the position, cubic, zero phase; length per record",
             "noise_method": noise.METHOD,
@@ -89,7 +74,7 @@ def compare(
             for name, unit in {**VARIABLES, "direction": "1"}.items()
             if any(name in by for by in maps.values())
         },
-        "verdict": _verdict(summary, found, settings),
+        "verdict": _verdict(summary, found, horizon),
         "findings": [f.as_dict() for f in found],
         "summary": summary,
         "error_maps": _plain_maps(maps),
@@ -98,43 +83,42 @@ def compare(
 
 
 def _run_all(
-    model: Model, plant: Plant, records: Sequence[Record], settings: Settings, progress: Progress | None
+    model: Model, plant: Plant, records: Sequence[Record], horizon: float, progress: Progress | None
 ) -> list[Compared]:
     """All records in their order; the plant's kernels run beside each other on as many cores as there are."""
 
     def one(index: int) -> Compared:
         if progress is not None:
             progress(records[index].name)
-        return run(model, plant, records[index], settings.horizon, seed=index)
+        return run(model, plant, records[index], horizon, seed=index)
 
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         return list(pool.map(one, range(len(records))))
 
 
-def error_maps(compared: Sequence[Compared], channels: Sequence[str]) -> dict[str, dict[str, ErrorMap]]:
+def _maps(compared: Sequence[Compared], channels: Sequence[str]) -> dict[str, dict[str, ErrorMap]]:
     """Maps of every channel's horizon error over every variable that all records have, records pooled."""
-    folds = errormaps.folds_of([c.data.record.time for c in compared])
-    values: dict[str, Array] = {}
+    folds = folds_of([c.data.record.time for c in compared])
+    binnings = {}
     for name in VARIABLES:
         if name == "time":
-            values[name] = np.concatenate([c.data.record.time - c.data.record.time[0] for c in compared])
+            values = [c.data.record.time - c.data.record.time[0] for c in compared]
         elif all(name in c.data.channels for c in compared):
-            values[name] = np.concatenate([c.data.channels[name] for c in compared])
-    binnings = {name: errormaps.Binning.of(x) for name, x in values.items()}
-    directions = [
-        errormaps.directions(c.data.channels["velocity"], _STANDING * c.data.noise["velocity"]) for c in compared
-    ]
-    binnings["direction"] = errormaps.Binning.of(np.concatenate(directions), errormaps.DIRECTION_EDGES)
+            values = [c.data.channels[name] for c in compared]
+        else:
+            continue
+        binnings[name] = Binning.of(np.concatenate(values))
+    moving = [directions(c.data.channels["velocity"], _STANDING * c.data.noise["velocity"]) for c in compared]
+    binnings["direction"] = Binning.of(np.concatenate(moving), DIRECTION_EDGES)
     maps: dict[str, dict[str, ErrorMap]] = {}
     for channel in channels:
-        error = np.concatenate(
-            [
-                c.error("horizon", channel) if channel in c.data.compared else np.full(c.data.record.time.size, np.nan)
-                for c in compared
-            ]
-        )
-        independent = errormaps.independent_samples(error, folds)
-        maps[channel] = {v: errormaps.error_map(error, b, folds, independent) for v, b in binnings.items()}
+        errors = [
+            c.error("horizon", channel) if channel in c.data.compared else np.full(c.data.record.time.size, np.nan)
+            for c in compared
+        ]
+        error = np.concatenate(errors)
+        independent = independent_samples(error, folds)
+        maps[channel] = {v: error_map(error, b, folds, independent) for v, b in binnings.items()}
     return maps
 
 
@@ -170,14 +154,14 @@ def _findings(
     documents: Sequence[dict[str, Any]],
     summary: dict[str, dict[str, Any]],
     maps: dict[str, dict[str, ErrorMap]],
-    settings: Settings,
+    horizon: float,
 ) -> list[Finding]:
     """All sentences, the strongest first."""
     found: list[Finding] = []
     for channel, figures in summary.items():
         unit, at = UNITS[channel], figures["horizon"]
         noise_std = figures["noise_std"]
-        size = findings.size_finding(channel, unit, at["rmse"], at["exact_rmse"], noise_std, settings.horizon)
+        size = findings.size_finding(channel, unit, at["rmse"], at["exact_rmse"], noise_std, horizon)
         found.append(size)
         if size.kind == "at_noise":
             continue
@@ -205,16 +189,16 @@ def _findings(
     return sorted(found, key=lambda f: (order[f.kind], -f.weight))
 
 
-def _verdict(summary: dict[str, dict[str, Any]], found: Sequence[Finding], settings: Settings) -> dict[str, Any]:
+def _verdict(summary: dict[str, dict[str, Any]], found: Sequence[Finding], horizon: float) -> dict[str, Any]:
     """One sentence on top of the page, and a level: explained, close or off."""
     at = {name: s["horizon"] for name, s in summary.items()}
     missed = sorted((n for n in at if at[n]["ratio"] > findings.AT_FLOOR), key=lambda n: -at[n]["ratio"])
     if not missed:
-        text = f"The model explains these records to within the measurement noise, {settings.horizon:g} s ahead."
+        text = f"The model explains these records to within the measurement noise, {horizon:g} s ahead."
         return {"level": "explained", "text": text}
     fits = [f"{TITLES[n]} to {percent(1.0 - at[n]['nrmse'])}" for n in HEADLINE if n in at]
     text = (
-        f"{settings.horizon:g} s ahead the model fits {' and '.join(fits)}. Its errors are up to "
+        f"{horizon:g} s ahead the model fits {' and '.join(fits)}. Its errors are up to "
         f"{number(at[missed[0]]['ratio'])} times ({TITLES[missed[0]]}) what an exact model would show "
         "at this noise."
     )

@@ -10,11 +10,11 @@ from hydraulic_sim.arrays import Array
 from hydraulic_sim.model_file import Model
 from hydraulic_sysid.data.decimation import trace
 
-from .run import MODES, Compared
+from .reference_run import MODES, Compared
 from .spectra import amplitude_density, noise_density
 
 
-def record_document(c: Compared, trace_points: int) -> dict[str, Any]:
+def record_document(c: Compared) -> dict[str, Any]:
     """Figures, traces for plots, spectra and error growth of one record."""
     record, data = c.data.record, c.data
     document: dict[str, Any] = {
@@ -26,16 +26,19 @@ def record_document(c: Compared, trace_points: int) -> dict[str, Any]:
         "description": record.description,
         "velocity_filter_window": data.velocity_filter.window,
         "channels": {},
-        "drive": trace(record.time, record["drive"], trace_points),
+        "drive": trace(record.time, record["drive"]),
         "traces": {},
         "spectra": {},
         "error_growth": {"lead_time": c.runs.growth_lead},
     }
     for name in data.compared:
         document["channels"][name] = {"noise_std": data.noise[name], **{mode: figures(c, mode, name) for mode in MODES}}
-        document["traces"][name] = _traces(c, name, trace_points)
+        document["traces"][name] = _traces(c, name)
         document["spectra"][name] = _spectra(c, name)
-        document["error_growth"][name] = {"rms": c.runs.growth_rms[name], "exact_rms": c.twin_runs.growth_rms[name]}
+        document["error_growth"][name] = {
+            "rms": c.runs.growth_rms[name],
+            "exact_rms": c.reference_runs.growth_rms[name],
+        }
     return document
 
 
@@ -55,20 +58,24 @@ def figures(c: Compared, mode: str, channel: str) -> dict[str, float]:
         "samples": int(y.size),
     }
     if mode == "free_run":
-        slope, offset = np.polyfit(c.data.record.time[keep], error, 1)
-        left = error - slope * c.data.record.time[keep] - offset
-        found["drift"] = float(slope)
+        found["drift"], left = _detrended(c.data.record.time[keep], error)
         found["rmse_detrended"] = float(np.sqrt(np.mean(left**2)))
         found["nrmse_detrended"] = float(np.linalg.norm(left)) / spread if spread > 0.0 else float("nan")
     return found
 
 
-def _traces(c: Compared, name: str, points: int) -> dict[str, Any]:
+def _detrended(time: Array, error: Array) -> tuple[float, Array]:
+    """Slope of the straight line through an error, and the error without it."""
+    line = np.polyfit(time, error, 1)
+    return float(line[0]), error - np.polyval(line, time)
+
+
+def _traces(c: Compared, name: str) -> dict[str, Any]:
     time = c.data.record.time
-    traces = {"measured": trace(time, c.data.channels[name], points)}
+    traces = {"measured": trace(time, c.data.channels[name])}
     for mode in ("free_run", "horizon"):
-        traces[mode] = trace(time, getattr(c.runs, mode)[name], points)
-        traces[f"{mode}_error"] = trace(time, c.error(mode, name), points)
+        traces[mode] = trace(time, getattr(c.runs, mode)[name])
+        traces[f"{mode}_error"] = trace(time, c.error(mode, name))
     return traces
 
 
@@ -76,8 +83,7 @@ def _spectra(c: Compared, name: str) -> dict[str, Array]:
     """Amplitude densities; the free run's error without its straight drift, which would leak over all bands."""
     dt, data = c.data.record.dt, c.data
     frequency, signal = amplitude_density(data.channels[name], dt)
-    time, free = data.record.time, c.error("free_run", name)
-    free = free - np.polyval(np.polyfit(time, free, 1), time)
+    _, free = _detrended(data.record.time, c.error("free_run", name))
     derivative = data.velocity_filter if name == "velocity" else None
     sigma = data.noise["position" if derivative else name]
     return {

@@ -15,7 +15,7 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.display import TITLES, first_upper, number, quantity
 
-from .errormaps import ErrorMap
+from .error_maps import ErrorMap
 from .spectra import power_shares
 
 AT_FLOOR = 1.5
@@ -96,7 +96,7 @@ def is_own(channel: str, variable: str) -> bool:
 
 
 def _own_finding(channel: str, unit: str, variable: str, m: ErrorMap) -> Finding:
-    slope = _weighted_slope(m.center, m.mean, m.count / m.count.sum())
+    slope, _ = _line(m)
     text = (
         f"The {TITLES[channel]} error goes with the {TITLES[variable]} itself ({number(100 * slope)} % of it on "
         "average): amplitude or phase of its motion are not met."
@@ -121,7 +121,6 @@ def _direction_shape(m: ErrorMap, unit: str) -> tuple[str, dict[str, Any]]:
 def _curve_shape(m: ErrorMap, unit: str, variable: str, variable_unit: str) -> tuple[str, dict[str, Any]]:
     """Words for a curve of bin means: odd, even, rising, falling or local."""
     title = TITLES[variable]
-    weights = m.count / m.count.sum()
     top, bottom = int(np.argmax(m.mean)), int(np.argmin(m.mean))
     numbers: dict[str, Any] = {
         "largest_mean": m.mean[top],
@@ -129,25 +128,25 @@ def _curve_shape(m: ErrorMap, unit: str, variable: str, variable_unit: str) -> t
         "smallest_mean": m.mean[bottom],
         "smallest_at": m.center[bottom],
     }
-    spread = (
+    ends = (
         f"mean {quantity(m.mean[bottom], unit)} near {quantity(m.center[bottom], variable_unit)}, "
         f"{quantity(m.mean[top], unit)} near {quantity(m.center[top], variable_unit)}"
     )
-    slope = _weighted_correlation(m.center, m.mean, weights)
-    numbers["linear_correlation"] = slope
+    _, correlation = _line(m)
+    numbers["linear_correlation"] = correlation
     if variable in ("velocity", "drive", "spool", "load_pressure") and m.center[0] < 0.0 < m.center[-1]:
         odd = odd_share(m)
         below, above = _half_means(m)
         numbers |= {"odd_share": odd, "mean_below_zero": below, "mean_above_zero": above}
         if odd >= 0.8 and _opposite(below, above):
-            if abs(slope) >= 0.95:
-                return f"is nearly proportional to {title}: {spread}", numbers
+            if abs(correlation) >= 0.95:
+                return f"is nearly proportional to {title}: {ends}", numbers
             return f"changes sign with {title}: {_sides(m, unit, variable_unit)}", numbers
         if odd <= 0.2:
-            return f"depends on the size of {title}, not on its sign: {spread}", numbers
-    if abs(slope) >= 0.9:
-        return f"{'rises' if slope > 0 else 'falls'} with {title}: {spread}", numbers
-    return f"varies with {title}: {spread}", numbers
+            return f"depends on the size of {title}, not on its sign: {ends}", numbers
+    if abs(correlation) >= 0.9:
+        return f"{'rises' if correlation > 0 else 'falls'} with {title}: {ends}", numbers
+    return f"varies with {title}: {ends}", numbers
 
 
 def odd_share(m: ErrorMap) -> float:
@@ -188,15 +187,12 @@ def _half_means(m: ErrorMap) -> tuple[float, float]:
     )
 
 
-def _weighted_slope(x: Array, y: Array, weights: Array) -> float:
-    dx, dy = x - np.average(x, weights=weights), y - np.average(y, weights=weights)
-    return float(np.sum(weights * dx * dy) / np.sum(weights * dx**2))
-
-
-def _weighted_correlation(x: Array, y: Array, weights: Array) -> float:
-    dx, dy = x - np.average(x, weights=weights), y - np.average(y, weights=weights)
-    scale = np.sqrt(np.sum(weights * dx**2) * np.sum(weights * dy**2))
-    return float(np.sum(weights * dx * dy) / scale) if scale > 0.0 else 0.0
+def _line(m: ErrorMap) -> tuple[float, float]:
+    """Slope of the straight line through the bin means, weighted by their counts, and their correlation."""
+    weights = m.count / m.count.sum()
+    dx, dy = m.center - np.average(m.center, weights=weights), m.mean - np.average(m.mean, weights=weights)
+    xx, yy, xy = (float(np.sum(weights * p)) for p in (dx**2, dy**2, dx * dy))
+    return xy / xx, xy / np.sqrt(xx * yy) if yy > 0.0 else 0.0
 
 
 def drift_finding(drift: float, detrended: float, rmse: float, record: str, duration: float) -> Finding | None:

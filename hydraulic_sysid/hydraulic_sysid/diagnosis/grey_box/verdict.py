@@ -11,11 +11,11 @@ _NOISE_ONLY = 1.5  # mean squares of an error, over that of an exact model, up t
 
 
 def shares(side: Mapping[str, float]) -> dict[str, float]:
-    """Parts of the white box's mean squared error on held-out data; together 1.
+    """Parts of the white box's mean squared error on test data; together 1.
 
     ``noise``: an exact model has it too; ``linear`` and ``nonlinear``: a black box explains it, the second only with
-    nonlinear terms; ``unexplained``: what remains, which drive and motion of the white box do not tell. A black box
-    that does harm on fresh data explains nothing.
+    nonlinear terms; ``unexplained``: what remains, which drive and motion of the white box do not determine. A black
+    box that does harm on fresh data explains nothing.
     """
     whole = side["white"] ** 2
     if whole <= 0.0:
@@ -32,7 +32,7 @@ def verdict(name: str, channels: Mapping[str, Any]) -> dict[str, str]:
     key = next(iter(channels))
     side, part = channels[key]["test"], channels[key]["shares"]
     unit, title = channels[key]["unit"], channels[key]["title"]
-    left = f"{name} misses {quantity(side['white'], unit)} of the {title} on held-out data"
+    left = f"{name} misses {quantity(side['white'], unit)} of the {title} on test data"
     if all(c["test"]["white"] ** 2 <= _NOISE_ONLY * c["test"]["exact"] ** 2 for c in channels.values()):
         return {"level": "explained", "text": f"{left}, no more than noise explains: the physics names all there is."}
     unnamed = part["linear"] + part["nonlinear"]

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import welch
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.diagnosis.compare import errormaps
+from hydraulic_sysid.diagnosis.compare import error_maps
 from hydraulic_sysid.diagnosis.compare.findings import WORTH_SAYING
 from hydraulic_sysid.diagnosis.compare.spectra import band_average
 from hydraulic_sysid.estimation.metrics import autocorrelation, cross_correlation
@@ -137,18 +137,18 @@ def _low_passed(values: Array, band: float, rate: float) -> Array:
 def _maps(residuals: Sequence[Array], studied: Sequence[RecordBalances]) -> Iterator[tuple[str, dict[str, object]]]:
     """Variable and the map of the residual over it."""
     error = np.concatenate(residuals)
-    folds = errormaps.folds_of([np.arange(r.size) / s.rate for r, s in zip(residuals, studied, strict=True)])
-    independent = errormaps.independent_samples(error, folds)
+    folds = error_maps.folds_of([np.arange(r.size) / s.rate for r, s in zip(residuals, studied, strict=True)])
+    independent = error_maps.independent_samples(error, folds)
     for variable in VARIABLES:
         values = np.concatenate([_variable(s, variable, r.size) for s, r in zip(studied, residuals, strict=True)])
         if np.ptp(values) > 0.0:
-            binning = errormaps.Binning.of(values, errormaps.DIRECTION_EDGES if variable == "direction" else None)
-            yield variable, errormaps.error_map(error, binning, folds, independent).as_dict()
+            binning = error_maps.Binning.of(values, error_maps.DIRECTION_EDGES if variable == "direction" else None)
+            yield variable, error_maps.error_map(error, binning, folds, independent).as_dict()
 
 
 def _variable(s: RecordBalances, name: str, length: int) -> Array:
     if name == "direction":
-        values = errormaps.directions(s.own.signals.velocity, _STANDING * s.data.noise["velocity"])
+        values = error_maps.directions(s.own.signals.velocity, _STANDING * s.data.noise["velocity"])
     else:
         values = getattr(s.own.signals, name)
     # The decimated sample stands for the middle of the smoothing kernel.

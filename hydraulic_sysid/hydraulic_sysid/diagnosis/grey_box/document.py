@@ -2,8 +2,8 @@
 
 What a physical model misses of the measurement is, at a finite horizon, either noise (what an exact model would miss
 too), or a function of drive and motion that comes back on fresh data, or neither. A black box fitted to the error and
-tried on data held out tells the second from the third; its terms say what the missing physics looks like. The grey box
-is the sum of both [1, 2].
+judged on test data distinguishes the second from the third; its terms say what the missing physics looks like. The grey
+box is the sum of both [1, 2].
 
 [1] L. Li, T. Thurner, Accurate modeling and identification of servo-hydraulic cylinder systems (2013).
 [2] L. Jin, Q. Wang, Accurate model identification of the inertial mass dynamic of hydraulic cylinder (2019).
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.arrays import Array, Index
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant
@@ -26,11 +27,10 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.diagnosis.compare.channels import UNITS
 from hydraulic_sysid.diagnosis.compare.prediction import check
-from hydraulic_sysid.diagnosis.compare.run import Compared, run
+from hydraulic_sysid.diagnosis.compare.reference_run import Compared, run
 
-from .errors import GreyBoxError
-from .features import Scales, Terms, terms
 from .selection import FOLDS, Selected, select
+from .terms import Scales, Terms, terms
 from .verdict import shares, verdict
 
 TARGETS = ("velocity", "load_pressure")
@@ -40,8 +40,12 @@ BLOCK_S = 0.5
 _SIGNALS = ("velocity", "position", "load_pressure")
 
 
+class GreyBoxError(HydraulicError, ValueError):
+    """Records, or the way they are held out, do not allow a black box on top of the white one."""
+
+
 @dataclass(frozen=True)
-class _Part:
+class _Data:
     """One record, brought to `STEP_S`: signals of the white box, and of every target the error and an exact model's."""
 
     name: str
@@ -52,47 +56,51 @@ class _Part:
     exact: dict[str, Array]
 
 
+Side = Sequence[tuple[_Data, Terms]]
+"""Records with their candidate terms."""
+
+
 def grey_box(
     model: Model,
     records: Sequence[Record],
-    held_out: Sequence[Record],
+    test: Sequence[Record],
     horizon: float = 0.5,
     progress: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Result document: the black box is fitted to the errors on ``records`` and tried on ``held_out``.
+    """Result document: the black box is fitted to the errors on ``records`` and judged on ``test``.
 
     :raises GreyBoxError: no record on either side, or too short ones.
     :raises ComparisonError: a record that lacks what a comparison needs.
     """
-    if not records or not held_out:
+    if not records or not test:
         raise GreyBoxError("a grey box needs records to fit and records (or a part of them) held out")
     plant = Plant(model)
-    parts: list[_Part] = []
-    for record in [*records, *held_out]:
+    data: list[_Data] = []
+    for record in [*records, *test]:
         check(record, horizon)
         if progress is not None:
             progress(record.name)
-        parts.append(_part(run(model, plant, record, horizon, seed=len(parts))))
-    fitted, tried = parts[: len(records)], parts[len(records) :]
-    if sum(p.time.size for p in fitted) * STEP_S < 2 * FOLDS * BLOCK_S:
+        data.append(_data(run(model, plant, record, horizon, seed=len(data))))
+    if sum(d.time.size for d in data[: len(records)]) * STEP_S < 2 * FOLDS * BLOCK_S:
         raise GreyBoxError(f"the records to fit are too short: {2 * FOLDS * BLOCK_S:g} s are needed beyond the horizon")
-    scales = Scales.of([p.signals for p in fitted])
-    candidates = [terms(p.signals, p.dt, scales) for p in parts]
-    channels = [name for name in TARGETS if all(name in p.error for p in parts)]
-    found = {name: _channel(name, fitted, tried, candidates) for name in channels}
+    scales = Scales.of([d.signals for d in data[: len(records)]])
+    both = [(d, terms(d.signals, d.dt, scales)) for d in data]
+    fit, judge = both[: len(records)], both[len(records) :]
+    channels = [name for name in TARGETS if all(name in d.error for d in data)]
+    found = {name: _channel(name, fit, judge) for name in channels}
     return {
         **heading("greybox", 2),
         "title": f"Grey box on {model.name}",
         "model": {"name": model.name, "path": str(model.path) if model.path else None, "effects": list(model.effects)},
-        "settings": {"horizon": horizon, "sampling_time": STEP_S, "candidates": len(candidates[0].names)},
+        "settings": {"horizon": horizon, "sampling_time": STEP_S, "candidates": len(both[0][1].names)},
         "verdict": verdict(model.name, found),
         "channels": found,
-        "fit": [p.name for p in fitted],
-        "test": [p.name for p in tried],
+        "fit": [d.name for d, _ in fit],
+        "test": [d.name for d, _ in judge],
     }
 
 
-def _part(compared: Compared) -> _Part:
+def _data(compared: Compared) -> _Data:
     record = compared.data.record
     every = max(1, round(STEP_S / record.dt))
     predicted = compared.runs.horizon
@@ -104,14 +112,14 @@ def _part(compared: Compared) -> _Part:
     keep = np.flatnonzero(finite)
     if keep.size < 4 * every:
         raise GreyBoxError(f"{record.name}: nothing is left to compare beyond the horizon")
-    # The horizon's prediction has no value at the beginning only: what is kept is one stretch.
-    stretch = slice(int(keep[0]), int(keep[-1]) + 1)
+    # The horizon's prediction has no value at the beginning only: what is kept lies in a row.
+    kept = slice(int(keep[0]), int(keep[-1]) + 1)
 
     def slow(values: dict[str, Array]) -> dict[str, Array]:
-        return {name: _means(x[stretch], every) for name, x in values.items()}
+        return {name: _means(x[kept], every) for name, x in values.items()}
 
-    return _Part(
-        record.name, record.dt * every, _means(record.time[stretch], every), slow(signals), slow(error), slow(exact)
+    return _Data(
+        record.name, record.dt * every, _means(record.time[kept], every), slow(signals), slow(error), slow(exact)
     )
 
 
@@ -120,76 +128,66 @@ def _means(values: Array, every: int) -> Array:
     return values[:whole].reshape(-1, every).mean(axis=1)
 
 
-def _channel(name: str, fitted: Sequence[_Part], tried: Sequence[_Part], candidates: Sequence[Terms]) -> dict[str, Any]:
+def _channel(name: str, fit: Side, test: Side) -> dict[str, Any]:
     """White, linear grey and grey box of one channel: errors on both sides, and the terms."""
-    known, fresh = candidates[: len(fitted)], candidates[len(fitted) :]
-    values, target = np.vstack([t.values for t in known]), np.concatenate([p.error[name] for p in fitted])
-    blocks = _blocks(fitted)
-    linear = np.flatnonzero(known[0].linear)
+    values, target = _joined(name, fit)
+    blocks = _blocks([d.time for d, _ in fit])
+    linear = np.flatnonzero(fit[0][1].linear)
     only_linear = select(values[:, linear], target, blocks)
     only_linear = replace(only_linear, order=[int(linear[i]) for i in only_linear.order])
     full = select(values, target, blocks)
     if only_linear.cross_validated < full.cross_validated:
         full = only_linear
-    sides = {
-        "fit": _side(name, fitted, known, only_linear, full),
-        "test": _side(name, tried, fresh, only_linear, full),
-    }
+    sides = {"fit": _errors(name, fit, only_linear, full), "test": _errors(name, test, only_linear, full)}
+    records = []
+    for d, t in test:
+        error, black = d.error[name], full.predict(t.values)
+        traces = {"white": error, "black": black, "grey": error - black}
+        records.append({"name": d.name, "traces": {key: trace(d.time, x) for key, x in traces.items()}})
     return {
         "unit": UNITS[name],
         "title": TITLES[name],
         **sides,
         "shares": shares(sides["test"]),
-        "terms": _contributions(name, tried, fresh, full),
-        "records": [
-            {
-                "name": part.name,
-                "traces": {
-                    "white": trace(part.time, part.error[name]),
-                    "black": trace(part.time, full.predict(t.values)),
-                    "grey": trace(part.time, part.error[name] - full.predict(t.values)),
-                },
-            }
-            for part, t in zip(tried, fresh, strict=True)
-        ],
+        "terms": _contributions(name, test, full),
+        "records": records,
     }
 
 
-def _side(
-    name: str, parts: Sequence[_Part], candidates: Sequence[Terms], linear: Selected, full: Selected
-) -> dict[str, float]:
+def _joined(name: str, side: Side) -> tuple[Array, Array]:
+    """Terms (N, k) and error (N,) of all records in a row."""
+    return np.vstack([t.values for _, t in side]), np.concatenate([d.error[name] for d, _ in side])
+
+
+def _errors(name: str, side: Side, linear: Selected, full: Selected) -> dict[str, float]:
     """RMS of the white box's error, of what the black boxes leave of it, and of an exact model's error."""
-    error = np.concatenate([p.error[name] for p in parts])
-    values = np.vstack([t.values for t in candidates])
+    values, error = _joined(name, side)
     return {
         "white": _rms(error),
         "linear": _rms(error - linear.predict(values)),
         "grey": _rms(error - full.predict(values)),
-        "exact": _rms(np.concatenate([p.exact[name] for p in parts])),
+        "exact": _rms(np.concatenate([d.exact[name] for d, _ in side])),
     }
 
 
-def _contributions(
-    name: str, parts: Sequence[_Part], candidates: Sequence[Terms], full: Selected
-) -> list[dict[str, Any]]:
-    """Every term with the share of the held-out error that is lost without it."""
-    error = np.concatenate([p.error[name] for p in parts])
-    values = np.vstack([t.values for t in candidates])
+def _contributions(name: str, side: Side, full: Selected) -> list[dict[str, Any]]:
+    """Every term with the share of the mean squared error that is lost without it."""
+    values, error = _joined(name, side)
     left, total = error - full.predict(values), float(np.mean(error**2))
     rows = []
     for index, coefficient in zip(full.order, full.coefficients, strict=True):
         own = values[:, index] * coefficient
         without = float(np.mean((left + own - np.mean(own)) ** 2))
-        gain = (without - float(np.mean(left**2))) / total
-        rows.append({"name": candidates[0].names[index], "coefficient": float(coefficient), "share": gain})
+        share = (without - float(np.mean(left**2))) / total
+        rows.append({"name": side[0][1].names[index], "coefficient": float(coefficient), "share": share})
     return sorted(rows, key=lambda row: -float(row["share"]))
 
 
-def _blocks(parts: Sequence[_Part]) -> Index:
+def _blocks(times: Sequence[Array]) -> Index:
     """Number of the half-second block of every sample, records in a row."""
     numbers, first = [], 0
-    for part in parts:
-        own = np.floor((part.time - part.time[0]) / BLOCK_S + 1e-9).astype(np.int64)
+    for time in times:
+        own = np.floor((time - time[0]) / BLOCK_S + 1e-9).astype(np.int64)
         numbers.append(first + own)
         first += int(own[-1]) + 1
     return np.concatenate(numbers)
