@@ -55,13 +55,14 @@ def cache_root() -> Path:
     root = Path(home) / "hydraulic_sim"
     try:
         root.mkdir(parents=True, exist_ok=True)
-        return root if os.access(root, os.W_OK) else _temporary()
+        return root if os.access(root, os.W_OK) else temporary_root()
     except OSError:
-        return _temporary()
+        return temporary_root()
 
 
 @lru_cache(maxsize=1)
-def _temporary() -> Path:
+def temporary_root() -> Path:
+    """A folder of the user's own among the temporary files, the same for the whole process."""
     # What lies there is executed: it must be nobody else's, who may have taken the name.
     root = Path(tempfile.gettempdir()) / f"hydraulic_sim-{os.getuid()}"
     try:

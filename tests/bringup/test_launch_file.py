@@ -159,6 +159,15 @@ def test_it_describes_its_arguments(description: ModuleType) -> None:
     assert [a.name for a in arguments] == [name for name, _, _ in constant("ARGUMENTS")]
 
 
+def nodes_of(description: ModuleType, chosen: dict[str, str]) -> list[Any]:
+    """What is started for arguments that differ from their defaults."""
+    from launch import LaunchContext
+
+    context = LaunchContext()
+    context.launch_configurations.update({name: value for name, value, _ in constant("ARGUMENTS")} | chosen)
+    return list(description.generate_launch_description().entities[-1].execute(context))
+
+
 @pytest.mark.parametrize(
     ("chosen", "nodes"),
     [
@@ -173,11 +182,7 @@ def test_it_describes_its_arguments(description: ModuleType) -> None:
 def test_it_starts_what_is_asked_for(description: ModuleType, chosen: dict[str, str], nodes: list[str]) -> None:
     from launch_ros.actions import Node
 
-    from launch import LaunchContext
-
-    context = LaunchContext()
-    context.launch_configurations.update({name: value for name, value, _ in constant("ARGUMENTS")} | chosen)
-    started = [action for action in description._nodes(context) if isinstance(action, Node)]
+    started = [action for action in nodes_of(description, chosen) if isinstance(action, Node)]
     assert [node.node_executable for node in started] == nodes
 
 
@@ -191,9 +196,5 @@ def test_it_starts_what_is_asked_for(description: ModuleType, chosen: dict[str, 
     ],
 )
 def test_what_cannot_be_started_is_refused(description: ModuleType, chosen: dict[str, str], complaint: str) -> None:
-    from launch import LaunchContext
-
-    context = LaunchContext()
-    context.launch_configurations.update({name: value for name, value, _ in constant("ARGUMENTS")} | chosen)
     with pytest.raises(RuntimeError, match=complaint):
-        description._nodes(context)
+        nodes_of(description, chosen)

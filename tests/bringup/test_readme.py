@@ -252,8 +252,3 @@ def test_column_maps_that_the_architecture_names_are_shipped() -> None:
     named = re.findall(r"--columns (\w+)", text)
     assert named
     assert set(named) <= set(shipped_maps())
-
-
-def test_the_readme_says_that_the_can_driver_is_missing_exactly_as_long_as_it_is() -> None:
-    there = (ROOT / "hydraulic_can_driver/hydraulic_can_driver/nodes/can_driver.py").exists()
-    assert ("CAN driver node is not written yet" in README) != there

@@ -194,7 +194,7 @@ def test_the_relay_experiment_through_the_topics(plant: Any, node: Any, client: 
     assert found["critical_gain"] == pytest.approx(expected.gain, rel=0.4)
 
 
-def test_the_relay_needs_a_plant_that_obeys_and_stays_within_its_travel(plant: Any, node: Any, client: Any) -> None:
+def test_the_relay_needs_an_obedient_plant_and_keeps_its_travel(plant: Any, node: Any, client: Any) -> None:
     plant("enable_on_activate:=false")
     process = node("relay", "start_timeout:=3.0")
     assert process.wait() == 1

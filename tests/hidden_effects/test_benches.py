@@ -32,7 +32,7 @@ def test_the_plant_imports_nothing_of_the_project(module):
         assert not [n for n in names if n.startswith("hydraulic")], names
 
 
-def test_every_effect_of_the_library_is_hidden_somewhere_and_compared_by_its_own_parameters():
+def test_every_library_effect_is_hidden_and_compared_by_its_parameters():
     every = library(())
     assert set(catalogue.LIBRARY) == {name for name, e in every.items() if not e.always_on}
     assert not set(catalogue.UNKNOWN) & set(every)
@@ -89,7 +89,7 @@ def test_the_users_model_is_the_data_sheet_without_what_is_hidden(bench, tmp_pat
         assert model.value("viscous_friction.coefficient") == bench.sheet()["viscous"]
 
 
-def test_a_bench_is_the_same_when_made_again_and_differs_when_measured_again():
+def test_a_bench_is_reproducible_and_a_new_measurement_differs():
     bench = benches.Bench("single", ("valve_deadband",), "mild", 3)
     one, two = (benches.make(bench, names=("steps",))["steps"] for _ in range(2))
     assert all(np.array_equal(one[c], two[c]) for c in plant.COLUMNS)

@@ -45,7 +45,7 @@ def test_shut_in_oil_conserves_mass():
         assert np.ptp(mass) < 1e-9
 
 
-def test_coulomb_friction_takes_four_times_its_force_over_stiffness_per_cycle():
+def test_coulomb_friction_takes_four_levels_over_stiffness_per_cycle():
     level = 300.0
     start = (0.0, 0.0, MIDDLE + 1e6, MIDDLE - 1e6)
     _, seen = plant.run(SHUT | {"coulomb": level, "bristle": 1e-6}, still(0.3), centring=0.0, start=start)

@@ -35,7 +35,7 @@ def test_the_help_lists_the_parameters() -> None:
 
 
 @pytest.mark.parametrize(("chosen", "used"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
-def test_nodes_are_found_on_this_machine_only_unless_the_user_says_otherwise(
+def test_nodes_are_found_on_this_machine_only_by_default(
     chosen: str | None, used: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(RANGE, "before")  # so that it is restored in either case

@@ -20,9 +20,9 @@ def temporary_folder_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
     monkeypatch.delenv(compiled.CACHE_VARIABLE, raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    compiled._temporary.cache_clear()
+    compiled.temporary_root.cache_clear()
     yield tmp_path
-    compiled._temporary.cache_clear()
+    compiled.temporary_root.cache_clear()
 
 
 def test_every_user_has_a_folder_of_their_own(place: Path) -> None:

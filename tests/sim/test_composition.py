@@ -176,7 +176,7 @@ def test_an_effect_that_contradicts_itself_is_refused() -> None:
 # --- models ---------------------------------------------------------------------------------------------------
 
 
-def test_unknown_effects_and_parameters_are_refused_with_those_there_are(bare: Model) -> None:
+def test_unknown_effects_and_parameters_are_refused_with_the_known_ones(bare: Model) -> None:
     with pytest.raises(ModelError, match=r"unknown effect 'friction'; the library has: backlash, .*viscous_friction"):
         bare.with_effect("friction")
     with pytest.raises(ModelError, match="'coulomb_friction' has no parameter 'force'; it has: level"):
@@ -227,6 +227,6 @@ def test_switching_effects_compiles_nothing(bare: Model, monkeypatch: pytest.Mon
     Plant(bare)
     from hydraulic_sim import compiled
 
-    monkeypatch.setattr(compiled, "_load", lambda found: pytest.fail("compiled again"))
+    monkeypatch.setattr(compiled, "write_module", lambda found: pytest.fail("compiled again"))
     Plant(bare.with_effect("spool_dynamics").with_effect("backlash", {"gap": 2e-3}))
     assert registry.library() is registry.library()

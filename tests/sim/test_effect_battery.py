@@ -297,7 +297,7 @@ def states_of(plant: Plant, drive: Array, dt: float, start: Any) -> Array:
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=ids(EFFECTS))
-def test_within_its_bounds_a_parameter_gives_finite_motion_or_a_clear_error(effect: Effect, bare: Model) -> None:
+def test_parameters_within_bounds_give_motion_or_a_clear_error(effect: Effect, bare: Model) -> None:
     model = with_partner(effect, bare)
     drive = np.concatenate([np.zeros(50), steps(0.2, 4.0, -6.0), sweep(0.15, 1.0, 30.0, 3.0)])
     for parameter in effect.parameters:

@@ -17,7 +17,7 @@ DT = 1e-3
 NUMBER = r"-?[\d.]+(?:e[+-]?\d+)?"
 
 
-def test_a_state_that_is_not_finite_stops_the_run_with_time_state_and_drive(bare: Model) -> None:
+def test_a_state_that_is_not_finite_stops_the_run_and_is_shown(bare: Model) -> None:
     plant = Plant(bare)
     start = plant.initial_state()
     start.states[plant.layout.states["velocity"]] = np.nan

@@ -350,7 +350,7 @@ def test_others_may_read_what_is_saved(write: Write, tmp_path: Path) -> None:
     assert stat.S_IMODE(saved.stat().st_mode) == 0o644
 
 
-def test_a_folder_that_is_not_there_and_a_model_that_does_not_compose_are_refused(write: Write, tmp_path: Path) -> None:
+def test_missing_folders_and_models_that_do_not_compose_are_refused(write: Write, tmp_path: Path) -> None:
     model = load_model(write(BENCH))
     with pytest.raises(ModelError, match="there is no folder"):
         save_model(model, tmp_path / "nowhere" / "bench.yaml")

@@ -113,7 +113,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory, bare: Model) -> Iterator[
 # --- it joins -------------------------------------------------------------------------------------------------
 
 
-def test_it_joins_model_fit_and_catalogue_without_touching_another_file(workshop: Workshop) -> None:
+def test_a_user_effect_joins_model_fit_and_catalogue_by_its_file_alone(workshop: Workshop) -> None:
     model = load_model(workshop.model_file)
     assert "own_leak" in model.effects and "own_leak" in model.library
     assert {"own_leak.coefficient", "own_leak.shape"} <= set(model.keys())
@@ -154,7 +154,7 @@ def test_a_new_process_finds_what_was_compiled(workshop: Workshop) -> None:
     assert workshop.compiled() == known
 
 
-def test_a_changed_constant_reaches_two_new_processes_that_compile_at_once(workshop: Workshop) -> None:
+def test_a_changed_constant_reaches_two_processes_compiling_at_once(workshop: Workshop) -> None:
     known = workshop.compiled()
     workshop.edit("GAIN = 2.0", "GAIN = 3.0")
     both = [workshop.start(), workshop.start()]

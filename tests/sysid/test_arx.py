@@ -45,7 +45,7 @@ def test_standard_errors_cover_the_truth() -> None:
     assert model.loss == pytest.approx(0.09, rel=0.15)
 
 
-def test_constant_is_estimated_and_removed_offsets_give_the_same_dynamics() -> None:
+def test_estimated_and_removed_offsets_give_the_same_dynamics() -> None:
     u = excite() + 0.8
     y = system(u, 1, 0.01, 5, constant=0.3)
     estimated = fit_arx([u], [y], 0.05, ArxOrder(3, 3, 1), "estimate")
@@ -151,7 +151,7 @@ def test_parameters_agree_with_plain_least_squares(order: ArxOrder, count: int) 
     np.testing.assert_allclose(model.standard_errors, errors, rtol=1e-6)
 
 
-def test_an_integrating_position_sampled_fast_agrees_with_plain_least_squares() -> None:
+def test_a_fast_sampled_integrator_agrees_with_plain_least_squares() -> None:
     """Neighbouring samples are nearly equal: normal equations would have lost half of the digits."""
     t = 1e-3 * np.arange(20_000)
     u = np.sin(2 * np.pi * 0.7 * t) + np.sign(np.sin(2 * np.pi * 0.31 * t))

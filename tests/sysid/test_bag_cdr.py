@@ -47,7 +47,7 @@ def test_every_number_and_text_is_that_of_the_message(data: st.DataObject) -> No
             np.testing.assert_array_equal(decoded.numbers[key][index], getattr(one, key))
 
 
-def test_what_is_encoded_decodes_to_the_same_and_is_the_librarys_message() -> None:
+def test_encoded_messages_decode_to_the_same_and_match_the_library() -> None:
     stamps = 1_700_000_000_123_456_789 + np.arange(50) * 1_000_000
     effort = np.random.default_rng(3).normal(size=(50, 2))
     template = cdr.stamped(

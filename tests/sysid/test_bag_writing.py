@@ -236,7 +236,7 @@ def test_an_experiment_ends_when_the_streams_have_come_as_far() -> None:
     assert rule.reason(1, 6 * SECOND, log, 49) == "experiment aborted"  # the plant has gone
 
 
-def test_an_experiment_that_starts_before_the_bag_is_closed_gets_its_own_time_to_arrive() -> None:
+def test_a_late_experiment_gets_its_own_time_to_arrive() -> None:
     log = ExperimentLog()
     rule = StopRule(0.0, on_experiment_end=True)
     for start in (1, 101):

@@ -43,7 +43,7 @@ def test_the_third_order_model_has_its_textbook_values(natural: float, damping: 
     assert found.band() == pytest.approx((0.1 * found.position, 2.0 * found.position))
 
 
-def test_the_bench_lies_between_what_its_closed_form_and_its_valve_allow() -> None:
+def test_the_benchs_bandwidth_lies_between_closed_form_and_valve() -> None:
     model = load_model(BENCH)
     found, closed = from_model(model), closed_form(model)
     assert found.velocity_gain == pytest.approx(closed.velocity_gain, rel=2e-3)

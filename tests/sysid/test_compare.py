@@ -137,7 +137,7 @@ def test_what_cannot_be_compared_is_named(model: Model) -> None:
         compare(model, [])
 
 
-def test_explained_share_is_about_zero_for_a_variable_without_influence_and_one_for_the_cause() -> None:
+def test_explained_share_is_one_for_the_cause_and_zero_for_a_bystander() -> None:
     rng = np.random.default_rng(5)
     time = [np.arange(0.0, 10.0, DT), np.arange(0.0, 10.0, DT)]
     folds = folds_of(time)
@@ -174,7 +174,7 @@ def test_map_statistics_and_missing_samples() -> None:
     assert m.explained == pytest.approx(1.0)
 
 
-def test_velocity_filter_is_longer_for_slow_motion_and_its_noise_is_told() -> None:
+def test_velocity_filter_is_longer_for_slow_motion_and_reports_its_noise() -> None:
     t = np.arange(0.0, 10.0, DT)
     rng = np.random.default_rng(6)
     noise = 2e-5 * rng.standard_normal(t.size)

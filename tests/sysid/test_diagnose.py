@@ -46,7 +46,7 @@ def model():
     return load_model("sample_bench")
 
 
-def test_every_third_stretch_is_held_out_and_shifts_from_record_to_record(model) -> None:
+def test_every_third_block_is_held_out_shifting_between_records(model) -> None:
     parts = split([standing(20.0, "a"), standing(20.0, "b")], [], Plant(model), 0.5)
     shares = [float(f.mean()) for f in parts.fitted]
     assert all(0.6 <= s <= 0.72 for s in shares)
@@ -87,7 +87,7 @@ def test_lines_are_tried_where_a_shape_is_a_frequency(model) -> None:
 
 @pytest.mark.parametrize("line", [7.0, 32.414, 180.3])
 @pytest.mark.parametrize("reversals", [0.1, 0.46, 1.3])
-def test_a_line_that_the_valve_turns_over_is_found_between_its_side_bands(line: float, reversals: float) -> None:
+def test_a_line_that_the_valve_modulates_is_found_between_side_bands(line: float, reversals: float) -> None:
     time = DT * np.arange(20001)
     drive = np.sign(np.sin(2.0 * np.pi * reversals * time))
     seen = drive * np.sin(2.0 * np.pi * line * time + 0.7) + np.random.default_rng(5).standard_normal(time.size)
@@ -195,7 +195,7 @@ def test_a_gain_must_show_on_fitted_and_on_held_out_pieces() -> None:
     assert before.excess == pytest.approx(3e4)
 
 
-def test_free_base_parameters_without_bounds_get_a_data_sheet_s_scatter(model) -> None:
+def test_free_parameters_without_bounds_get_the_data_sheets_scatter(model) -> None:
     bench = bounded(load_model("moog_mcr_m_1002_bench"))
     assert bench.entry("moving_mass").bounds == (500.0 / SCATTER, 500.0 * SCATTER)
     assert bounded(model).entry("moving_mass").bounds == (400.0, 600.0)  # the file's own
@@ -215,7 +215,7 @@ def test_shapes_are_effects_of_their_own_and_none_of_the_library(model) -> None:
         assert file.stem not in model.library
 
 
-def test_what_the_amplifier_imitates_is_said_before_the_hydraulics_are_blamed() -> None:
+def test_effects_of_the_amplifier_are_named_before_the_hydraulics() -> None:
     plain = standing(2.0)
     told = Record.sampled(
         "told", DT, dict(plain.channels), description={"plant": {"imitated_effects": ["valve_deadband"]}}

@@ -119,7 +119,7 @@ def test_sensors_add_their_noise_and_nothing_else(model) -> None:  # noqa: ANN00
     assert np.std(noisy.record["pressure_a"] - quiet.record["pressure_a"]) == pytest.approx(15e3, rel=0.1)
 
 
-def test_an_approach_brings_the_piston_to_the_centre_and_lifts_the_travel_limit(model) -> None:  # noqa: ANN001
+def test_an_approach_centres_the_piston_and_lifts_the_travel_limit(model) -> None:  # noqa: ANN001
     plan = replace(propose("sine", Wish(1.0, 4.0, 4.0)), travel_limit=0.1)
     assert plan.approach > 0.0
     played = rehearse(plan, Plant(model), position=0.5)

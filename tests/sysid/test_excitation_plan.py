@@ -96,7 +96,7 @@ def test_without_fades_the_signal_is_whole():
 
 
 @pytest.mark.parametrize("name", shipped_plans())
-def test_shipped_plans_are_named_as_their_files_and_stay_within_the_drive(name):
+def test_shipped_plans_have_their_files_names_and_stay_within_the_drive(name):
     plan = load_plan(name)
     assert plan.name == name
     assert plan.rate == 1000.0 and plan.duration == (26.0 if name == "probe" else 20.0)
@@ -179,7 +179,7 @@ def test_a_playback_counts_its_path_from_the_plan(tmp_path):
         load_plan(tmp_path / "plan.yaml")
 
 
-def test_what_a_command_line_says_of_a_bad_plan_is_one_line_of_the_user(tmp_path):
+def test_a_bad_plan_is_one_line_on_the_command_line(tmp_path):
     with pytest.raises(HydraulicError):
         load_plan(tmp_path / "none.yaml")
 

@@ -59,7 +59,7 @@ def test_a_slower_plant_gets_every_other_sample():
     np.testing.assert_array_equal(drive, run.plan.open_loop[::2])
 
 
-def test_centring_pulls_to_the_centre_within_its_limit_and_fades_with_the_signal():
+def test_centring_stays_within_its_limit_and_fades_with_the_signal():
     run = ExcitationRun(plan(Steps([0.0], 1.0), centre=0.1, centring_gain=4.0, centring_limit=0.5))
     assert run.step(0.0, 0.0) == 0.0  # resting
     drive = [0.0] + [run.step(k * STEP, 0.15) for k in range(1, 1500)]
@@ -251,7 +251,7 @@ def test_a_moment_in_which_nothing_is_answered_is_forgiven(signal):
     assert run.phase is Phase.FINISHED, run.reason
 
 
-def test_a_reversed_drive_is_found_where_the_signal_is_slower_than_the_window():
+def test_a_reversed_drive_is_found_under_a_slow_signal():
     run = ExcitationRun(plan(SLOW), applied_check=AppliedDriveCheck())
     time, _, _ = play(run, apply=lambda drive: -drive)
     assert run.phase is Phase.ABORTED and run.reason.startswith("the plant applied")

@@ -223,7 +223,7 @@ def test_a_bad_playback_file_is_named_with_row_and_column(tmp_path, content, wor
         assert word in str(raised.value)
 
 
-def test_playback_refuses_files_that_are_none_and_drives_that_are_too_large(tmp_path):
+def test_playback_refuses_bad_files_and_drives_that_are_too_large(tmp_path):
     with pytest.raises(PlaybackError, match="cannot be read"):
         Playback(tmp_path / "absent.csv")
     broken = tmp_path / "broken.csv.gz"

@@ -42,7 +42,7 @@ def test_waves_are_those_of_scipy() -> None:
     np.testing.assert_allclose(Sawtooth(2.0, 0.7).sample(inside), sawtooth, atol=1e-6)
 
 
-def test_a_square_that_is_shifted_by_a_quarter_moves_an_integrator_to_both_sides() -> None:
+def test_a_square_shifted_by_a_quarter_moves_to_both_sides() -> None:
     drive = Square(1.0, 0.5, 0.25).sample(T)
     position = np.cumsum(drive) / 1000.0
     assert position.max() == pytest.approx(-position.min(), abs=2e-3)

@@ -29,7 +29,7 @@ def test_thinning_keeps_a_slow_signal_and_takes_the_noise_down() -> None:
     assert decimate(noise, 1) is noise
 
 
-def test_whitened_noise_is_white_of_variance_one_also_where_the_whitener_was_not_made() -> None:
+def test_whitened_fresh_noise_is_white_with_variance_one() -> None:
     def coloured(seed: int) -> np.ndarray:
         e = np.random.default_rng(seed).standard_normal((2, 20_002))
         first = e[0, 2:] - 0.8 * e[0, 1:-1]
@@ -70,7 +70,7 @@ def test_play_and_rate_limit_follow_their_definitions() -> None:
     assert step[5:15] == pytest.approx(np.arange(1, 11) * 0.1) and step[-1] == 1.0
 
 
-def test_line_common_to_records_is_found_and_one_of_the_excitation_is_not() -> None:
+def test_a_line_common_to_records_is_found_but_not_the_excitations() -> None:
     rng = np.random.default_rng(4)
     t = np.arange(4000) / 200.0
     records = [rng.standard_normal((2, t.size)) for _ in range(4)]

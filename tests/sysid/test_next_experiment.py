@@ -16,7 +16,14 @@ from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
-from hydraulic_sysid.diagnosis.next_experiment import Limits, NextExperimentError, Proposal, limits_of, next_experiment
+from hydraulic_sysid.diagnosis.next_experiment import (
+    Limits,
+    NextExperimentError,
+    Proposal,
+    competing,
+    limits_of,
+    next_experiment,
+)
 from hydraulic_sysid.diagnosis.next_experiment.evidence import Point, as_record, evidence
 from hydraulic_sysid.diagnosis.next_experiment.movements import FAMILIES, Bench, Movement, every
 from hydraulic_sysid.diagnosis.next_experiment.reference import Leader, play
@@ -154,7 +161,7 @@ def test_a_refit_takes_away_what_free_parameters_explain(base: Model) -> None:
     assert all(twice[p] >= left[p] for p in left)
 
 
-def test_tight_limits_give_a_small_experiment_and_impossible_ones_an_error(base: Model) -> None:
+def test_tight_limits_give_a_small_experiment_impossible_ones_an_error(base: Model) -> None:
     rivals = {name: base.with_effect(name) for name in ("valve_deadband", "valve_hysteresis")}
     tight = replace(limits_of(rivals), drive=2.0, travel=0.01, velocity=0.05)
     seen = next_experiment(rivals, tight, NOISE, 3.0).document["prediction"]
@@ -271,7 +278,7 @@ def test_the_verb_names_models_by_what_only_they_have(
     for name in ("valve_deadband", "valve_hysteresis"):
         files.append(str(tmp_path / f"{name[-3:]}.yaml"))
         save_model(base.with_effect(name), Path(files[-1]))
-    assert list(verb._named(files)) == ["valve_deadband", "valve_hysteresis"]
-    assert list(verb._named([files[0], "sample_bench"])) == ["and", "sample_bench"]
+    assert list(competing.of_files(files)) == ["valve_deadband", "valve_hysteresis"]
+    assert list(competing.of_files([files[0], "sample_bench"])) == ["and", "sample_bench"]
     assert verb.main(["--model", *files, "--out", str(tmp_path / "out")]) == 2
     assert "--noise" in capsys.readouterr().err

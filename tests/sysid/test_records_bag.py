@@ -119,7 +119,7 @@ def test_the_command_holds_until_the_next_one(tmp_path: Path) -> None:
     np.testing.assert_array_equal(record["drive"], 0.01 * np.arange(8))
 
 
-def test_commands_of_several_sources_are_taken_in_the_order_of_their_stamps(tmp_path: Path) -> None:
+def test_commands_of_several_sources_are_ordered_by_stamp(tmp_path: Path) -> None:
     commands = [command(START + k * MS, float(k), "a rather long name" if k % 2 else "b") for k in range(8)]
     (record,) = read_records(bag(tmp_path / "run", [*streams(8), *commands]))
     np.testing.assert_array_equal(record["command"], np.arange(8))
@@ -181,7 +181,7 @@ def test_the_end_belongs_to_the_experiment_that_it_names(tmp_path: Path) -> None
     assert len(record) == 50 and record.description["experiment"]["event"] == "finished"
 
 
-def test_the_end_of_an_earlier_experiment_and_talk_on_the_topic_change_nothing(tmp_path: Path) -> None:
+def test_other_messages_on_the_experiment_topic_change_nothing(tmp_path: Path) -> None:
     chatter = [("experiment", START + 5, STORE.types[STRING](text)) for text in ("", "hello", "[1]", '{"event": 1}')]
     events = [event("finished", START - 5 * MS), event("started", START - 10 * MS), *chatter]
     (record,) = read_records(bag(tmp_path / "run", [*streams(), *events]))

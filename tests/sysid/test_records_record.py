@@ -93,4 +93,5 @@ def test_a_window_beyond_the_record_is_cut_and_an_empty_one_refused() -> None:
 
 
 def test_the_description_can_be_written_as_json() -> None:
-    json.dumps(record().split(0.5)[1].description, allow_nan=False)
+    description = record().split(0.5)[1].description
+    assert json.loads(json.dumps(description, allow_nan=False)) == description

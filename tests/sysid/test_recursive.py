@@ -179,7 +179,7 @@ def test_the_right_model_beside_the_plant_leaves_nothing() -> None:
     assert live.restarts == 6
 
 
-def test_a_wrong_model_drifts_until_it_starts_again_from_the_measurement() -> None:
+def test_a_wrong_model_drifts_until_it_restarts_from_the_measurement() -> None:
     model = load_model("moog_mcr_m_1002_bench")
     u = np.full(3000, 1.0)
     truth = Plant(model).simulate(u, 1e-3)

@@ -33,7 +33,7 @@ def model(plant: Plant):
     return fit_transfer_function([u], [plant.simulate(u, 1e-3)["position"]], 1e-3)
 
 
-def test_every_drive_is_tried_and_the_plant_starts_where_it_keeps_off_its_stops(plant: Plant, model) -> None:
+def test_every_drive_is_tried_away_from_the_stops(plant: Plant, model) -> None:
     cells = rmse_grid({"tf": model}, plant, Grid((1.0, 10.0), (0.05, 1.0), periods=2))
     assert len(cells) == 4 * 2 * 2
     by = {(c["shape"], c["amplitude"], c["frequency"]): c for c in cells}

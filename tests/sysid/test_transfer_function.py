@@ -82,7 +82,7 @@ def test_a_dead_time_between_samples_is_exact() -> None:
     assert metrics.best_fit(y, model.simulate(u, y)) > 99.9999
 
 
-def test_several_experiments_share_the_model_and_keep_their_initial_states() -> None:
+def test_experiments_share_the_model_and_keep_their_initial_states() -> None:
     us = [three_tones(1500, DT, f, 1.0) for f in (2.0, 5.0)]
     ys = [response(NUM, DEN, u, DT, x0) for u, x0 in zip(us, ([1.0, 0.0, 0.0], [0.0, -3.0, 0.1]), strict=True)]
     model = fit_transfer_function(us, ys, DT)

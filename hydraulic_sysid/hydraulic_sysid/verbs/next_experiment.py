@@ -1,7 +1,7 @@
-"""Design the experiment that tells rival models apart, for what a diagnosis could not decide.
+"""Design the experiment that tells competing models apart, for what a diagnosis could not decide.
 
-Every rival is refitted as well as it can be before it counts as different; travel, pressures, velocity and drive keep
-their limits on every rival. Writes the plan for the excitation node, its drive, next_experiment.json and a page.
+Every model is refitted as well as it can be before it counts as different; travel, pressures, velocity and drive keep
+their limits on every one. Writes the plan for the excitation node, its drive, next_experiment.json and a page.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ from typing import Any
 from rich.console import Console
 
 from hydraulic_node_utils import tables
-from hydraulic_sim.model_file import Model, load_model
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.display import number, span
-from hydraulic_sysid.diagnosis.next_experiment import NextExperimentError, limits_of, next_experiment
+from hydraulic_sysid.diagnosis.next_experiment import NextExperimentError, competing, limits_of, next_experiment
 from hydraulic_sysid.estimation.noise import noise_floor
 from hydraulic_sysid.estimation.segments import MEASURED
 from hydraulic_sysid.verbs import _options as opt
@@ -37,11 +36,11 @@ The plan is played by the excitation node: -p plan:=runs/next/next_experiment.ya
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
     parser = opt.parser("next_experiment", __doc__, EPILOG)
-    rivals = parser.add_mutually_exclusive_group(required=True)
-    rivals.add_argument(
+    models = parser.add_mutually_exclusive_group(required=True)
+    models.add_argument(
         "--diagnosis", metavar="DIR", type=Path, help="folder of a diagnosis that names several effects"
     )
-    rivals.add_argument("--model", metavar="FILE", nargs="+", help="the rivals' model files, fitted, two or more")
+    models.add_argument("--model", metavar="FILE", nargs="+", help="files of the competing models, fitted, two or more")
     opt.add_record_options(parser, required=False, window=False)
     parser.add_argument(
         "--noise", metavar="CHANNEL=SIGMA", nargs="+", default=[],
@@ -57,56 +56,23 @@ def main(argv: list[str] | None = None) -> int:
 
 def _design(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     opt.check_new(options.out, PLAN, "next_experiment.csv", what="plan")
-    diagnosis = _diagnosis(options.diagnosis) if options.diagnosis else None
-    rivals = _tied(options.diagnosis, diagnosis) if diagnosis else _named(options.model)
+    diagnosis: dict[str, Any] = {}
+    if options.diagnosis:
+        file = options.diagnosis / "diagnose.json" if options.diagnosis.is_dir() else options.diagnosis
+        diagnosis = results.read_result(file)
+    models = competing.of_diagnosis(file.parent, diagnosis) if diagnosis else competing.of_files(options.model)
     noise = _noise(options, diagnosis)
-    limits = replace(limits_of(rivals, options.centre), **opt.given_limits(options))
-    piece = options.piece or float((diagnosis or {}).get("settings", {}).get("segment_length", 0.5))
+    limits = replace(limits_of(models, options.centre), **opt.given_limits(options))
+    piece = options.piece or float(diagnosis.get("settings", {}).get("segment_length", 0.5))
     proposal = next_experiment(
-        rivals, limits, noise, options.seconds, lambda text: say(f"designing: {text}"),
+        models, limits, noise, options.seconds, lambda text: say(f"designing: {text}"),
         centre=options.centre, rate=options.rate, piece=piece,
     )  # fmt: skip
     result = {**proposal.document, "file": str(options.out / PLAN)}
     return opt.Done(result, {PLAN: lambda file: proposal.save(file.parent)}, result["verdict"]["level"] != "off")
 
 
-def _diagnosis(folder: Path) -> dict[str, Any]:
-    return results.read_result(folder / "diagnose.json" if folder.is_dir() else folder)
-
-
-def _tied(folder: Path, diagnosis: dict[str, Any]) -> dict[str, Model]:
-    """The models between which the diagnosis could not decide: ``competing_<effect>.yaml``, or its own model."""
-    folder = folder if folder.is_dir() else folder.parent
-    files = {file.stem.removeprefix("competing_"): file for file in sorted(folder.glob("competing_*.yaml"))}
-    rivals = {name: load_model(str(file)) for name, file in files.items()}
-    own = folder / "model.yaml"
-    if own.is_file():
-        model = load_model(str(own))
-        left = [n for n in diagnosis["verdict"].get("effects", ()) if n not in rivals and n in model.effects]
-        if left:
-            rivals = {"+".join(left): model, **rivals}
-    if len(rivals) < 2:
-        text = diagnosis["verdict"].get("text", "")
-        raise NextExperimentError(
-            f"{folder}: holds {len(rivals)} competing models (competing_<effect>.yaml, model.yaml); two or more are "
-            f"needed. Its verdict: {text}"
-        )
-    return rivals
-
-
-def _named(files: list[str]) -> dict[str, Model]:
-    """Models by what only they have on, or by their files' names where that is not unique."""
-    models = [load_model(file) for file in files]
-    common = set.intersection(*(set(m.effects) for m in models))
-    names = ["+".join(e for e in m.effects if e not in common) for m in models]
-    if len(set(names)) < len(names) or "" in names:
-        names = [Path(file).stem for file in files]
-    if len(set(names)) < len(names):
-        raise NextExperimentError(f"the same model twice: {', '.join(files)}")
-    return dict(zip(names, models, strict=True))
-
-
-def _noise(options: argparse.Namespace, diagnosis: dict[str, Any] | None) -> dict[str, float]:
+def _noise(options: argparse.Namespace, diagnosis: dict[str, Any]) -> dict[str, float]:
     """Standard deviation per channel: as given, else of the record, else as the diagnosis found it."""
     if options.noise:
         found = {}
@@ -121,7 +87,7 @@ def _noise(options: argparse.Namespace, diagnosis: dict[str, Any] | None) -> dic
         records = opt.read_records(options)
         channels = [c for c in MEASURED if all(c in r for r in records)]
         return {c: statistics.median(noise_floor(r[c]) for r in records) for c in channels}
-    if diagnosis is not None:
+    if diagnosis:
         return {c: statistics.median(by_record.values()) for c, by_record in diagnosis["noise_std"].items()}
     raise NextExperimentError("which channels are measured, and how noisy? Name a --record, or --noise CHANNEL=SIGMA …")
 
@@ -140,6 +106,6 @@ def _show(result: dict[str, Any], console: Console) -> None:
     p = result["prediction"]
     console.print(
         f"position {span(p['position_min'], p['position_max'], 'm')}, "
-        f"pressures {span(p['pressure_min'], p['pressure_max'], 'Pa')}, on every rival"
+        f"pressures {span(p['pressure_min'], p['pressure_max'], 'Pa')}, on every model"
     )
     console.print(result["verdict"]["text"])
