@@ -103,7 +103,7 @@ class Panels:
         self.line(panel, x, y, name, legend, line=line, hovertemplate="%{y:.4g}", **more)
 
     def bars(self, panel: int, names: Any, lengths: Any, name: str, colour: Any, numbers: list[str] | None = None,
-             legend: bool = False, lying: bool = False) -> None:  # fmt: skip
+             legend: bool = False, lying: bool = False, **more: Any) -> None:  # fmt: skip
         """Bars over names, upright or lying, with numbers at their ends."""
         x, y, hover = np.array(names), values(lengths), "%{x}: %{y:.4g}"
         if lying:
@@ -111,7 +111,7 @@ class Panels:
             self.y_axis(panel, automargin=True, type="category")
         self.line(
             panel, x, y, name, legend, type="bar", orientation="h" if lying else "v", marker={"color": colour},
-            text=numbers, textposition="outside", textangle=0, cliponaxis=False, hovertemplate=hover,
+            text=numbers, textposition="outside", textangle=0, cliponaxis=False, hovertemplate=hover, **more,
         )  # fmt: skip
 
     def over_noise(self, panel: int, heights: list[float], title: str = "× noise") -> None:
@@ -190,9 +190,8 @@ class Panels:
 def _plain(value: Any) -> Any:
     """The same with every text escaped, so that no name in a document becomes a tag of Plotly's."""
     if isinstance(value, str):
-        return (
-            escape(value, quote=False).replace("\n", "<br>").replace("&lt;extra&gt;&lt;/extra&gt;", "<extra></extra>")
-        )
+        safe = escape(value, quote=False).replace("\n", "<br>")
+        return safe.replace("&lt;extra&gt;&lt;/extra&gt;", "<extra></extra>")
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype.kind in "UO"):

@@ -45,6 +45,13 @@
       panels.forEach((p, i) => { p.hidden = i !== index; });
     };
     buttons.forEach((b, i) => b.addEventListener("click", () => show(i)));
+    choice.querySelector(":scope > .buttons").addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (!step) return;
+      const next = (buttons.indexOf(document.activeElement) + step + buttons.length) % buttons.length;
+      buttons[next].focus();
+      show(next);
+    });
   });
 
   addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));

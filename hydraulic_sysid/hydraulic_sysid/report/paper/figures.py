@@ -13,6 +13,7 @@ from hydraulic_sysid.report.style import Panels
 Result = dict[str, Any]
 
 COLOURS = {"chirp": style.HORIZON, "multisine": style.FREE_RUN}
+_BANDS = {"below": "0.01 … 0.1", "in": "0.1 … 2 (the paper's)", "above": "2 … 20"}
 _MARGIN = {"l": 66, "r": 14, "t": 40, "b": 44}
 
 
@@ -46,73 +47,39 @@ def fit(excitation: dict[str, Any]) -> go.Figure:
 
 def rmse(result: Result) -> go.Figure:
     """RMSE of both models over the shapes: one bar per amplitude and frequency, both panels on one scale."""
-    names = [e["name"] for e in result["excitations"] if e["band"] == "in"]
-    shapes = list(dict.fromkeys(cell["shape"] for cell in result["grid"]))
-    amplitudes = sorted({cell["amplitude"] for cell in result["grid"]})
-    frequencies = sorted({cell["frequency"] for cell in result["grid"]})
+    names, grid = [e["name"] for e in result["excitations"] if e["band"] == "in"], result["grid"]
+    shapes = list(dict.fromkeys(cell["shape"] for cell in grid))
+    amplitudes, frequencies = (sorted({cell[key] for cell in grid}) for key in ("amplitude", "frequency"))
     panels = Panels(len(names), gap=(0.0, 0.1), titles=[f"{name} model" for name in names])
-    highest = max(cell["models"][n]["rmse"] or 0.0 for cell in result["grid"] for n in names) * 1e3
+    factor, unit = style.shown("m")
+    highest = max(cell["models"][n]["rmse"] or 0.0 for cell in grid for n in names) * factor
     for panel, name in enumerate(names):
-        for a, amplitude in enumerate(amplitudes):
-            for f, frequency in enumerate(frequencies):
-                cells = {
-                    c["shape"]: c["models"][name]["rmse"]
-                    for c in result["grid"]
-                    if c["amplitude"] == amplitude and c["frequency"] == frequency
-                }
-                shade = 0.35 + 0.65 * f / max(len(frequencies) - 1, 1)
-                label = f"{amplitude:g} V, {frequency:.2g} Hz"
-                panels.line(
-                    panel,
-                    np.array(shapes),
-                    style.values([cells[s] for s in shapes], 1e3),
-                    label,
-                    legend=panel == 0,
-                    type="bar",
-                    marker={"color": (style.HORIZON, style.FREE_RUN)[a % 2], "opacity": shade},
-                    hovertemplate="%{x}, " + label + ": %{y:.3g} mm<extra></extra>",
-                )
-        panels.y_axis(panel, "RMSE [mm]", range=[0.0, 1.08 * highest])
-    return panels.figure(
-        520, barmode="group", legend=style.below(0.1), margin={**_MARGIN, "b": 90}, hovermode="closest"
-    )
+        for a, f in np.ndindex(len(amplitudes), len(frequencies)):
+            drive = amplitudes[a], frequencies[f]
+            cells = {c["shape"]: c for c in grid if (c["amplitude"], c["frequency"]) == drive}
+            heights = style.values([cells[shape]["models"][name]["rmse"] for shape in shapes], factor)
+            shade = 0.35 + 0.65 * f / max(len(frequencies) - 1, 1)
+            label, colour = f"{drive[0]:g} V, {drive[1]:.2g} Hz", (style.HORIZON, style.FREE_RUN)[a % 2]
+            panels.bars(panel, shapes, heights, label, colour, legend=panel == 0, opacity=shade)
+        panels.y_axis(panel, f"RMSE [{unit}]", range=[0.0, 1.08 * highest])
+    margin = {**_MARGIN, "b": 90}
+    return panels.figure(520, barmode="group", legend=style.below(0.1), margin=margin, hovermode="closest")
 
 
 def thesis(result: Result) -> go.Figure:
     """For every excitation: what its model misses of a perfect fit in the paper's band, and its RMSE over the grid."""
-    rows = result["thesis"]["rows"]
-    bands = list(dict.fromkeys(r["band"] for r in rows))
-    words = {"in": "0.1 … 2 (the paper's)", "below": "0.01 … 0.1", "above": "2 … 20"}
-    order = [b for b in ("below", "in", "above") if b in bands]
+    rows = {(r["excitation"], r["band"]): r for r in result["thesis"]["rows"]}
+    bands = [b for b in _BANDS if b in {band for _, band in rows}]
+    factor, unit = style.shown("m")
     panels = Panels(1, 2, gap=(0.1, 0.0), titles=["100 % − best fit in the paper's band", "RMSE over the grid"])
     for kind, colour in COLOURS.items():
-        mine = {r["band"]: r for r in rows if r["excitation"] == kind}
-        for panel, values in enumerate(
-            (
-                [_missing(mine.get(b)) for b in order],
-                [None if b not in mine or mine[b]["rmse"] is None else 1e3 * mine[b]["rmse"] for b in order],
-            )
-        ):
-            shown = np.array([np.nan if v is None else v for v in values], dtype=float)
-            panels.line(
-                panel,
-                np.array([words[b] for b in order]),
-                style.values(shown),
-                kind,
-                legend=panel == 0,
-                type="bar",
-                marker={"color": colour},
-                text=["no stable model" if not np.isfinite(v) else f"{v:.3g}" for v in shown],
-                textposition="outside",
-                cliponaxis=False,
-            )
-    panels.y_axis(0, "%", type="log", tickformat="~g", dtick=1)
-    panels.y_axis(1, "mm", type="log", tickformat="~g", dtick=1)
-    for panel in (0, 1):
+        mine = [rows.get((kind, band), {"best_fit_in_band": None, "rmse": None}) for band in bands]
+        missing = 100.0 - style.values([r["best_fit_in_band"] for r in mine])
+        for panel, heights in enumerate((missing, style.values([r["rmse"] for r in mine], factor))):
+            numbers = ["no stable model" if not np.isfinite(v) else f"{v:.3g}" for v in heights]
+            panels.bars(panel, [_BANDS[b] for b in bands], heights, kind, colour, numbers, legend=panel == 0)
+    for panel, title in enumerate(("%", unit)):
+        panels.y_axis(panel, title, type="log", tickformat="~g", dtick=1)
         panels.x_axis(panel, "excitation over the bandwidth", type="category")
     margin = {**_MARGIN, "t": 60, "b": 90}
     return panels.figure(380, barmode="group", bargap=0.3, legend=style.below(0.22), margin=margin, hovermode="closest")
-
-
-def _missing(row: dict[str, Any] | None) -> float | None:
-    return None if row is None or row["best_fit_in_band"] is None else 100.0 - row["best_fit_in_band"]
