@@ -213,7 +213,7 @@ def test_runs_are_started_by_service_one_after_the_other(bench: Bench) -> None:
     bench.wait_until(lambda: len(bench.events()) == 6, "the end of the third run")
     assert bench.events()[-1]["event"] == "aborted" and bench.events()[-1]["reason"] == "asked to abort"
     # An aborted run holds 0 V for a moment after it has been announced.
-    bench.wait_until(lambda: abort().message == "nothing to abort", "the end of the holding")
+    bench.wait_until(lambda: abort().message == "refused: nothing to abort", "the end of the holding")
 
 
 def test_another_source_is_not_disturbed(bench: Bench) -> None:

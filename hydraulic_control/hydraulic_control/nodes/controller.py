@@ -20,13 +20,9 @@ from hydraulic_control.nodes._controller_health import ControllerHealth
 from hydraulic_control.nodes._controller_parameters import PARAMETERS, ControllerParameters
 from hydraulic_control.session import ControlSession
 from hydraulic_interfaces.contract import CONTROLLER_NODE, NAMESPACE
-from hydraulic_interfaces.conversions import (
-    CommandEncoder,
-    MessageError,
-    reference_from_message,
-    sample_from_messages,
-)
+from hydraulic_interfaces.conversions import CommandEncoder, reference_from_message, sample_from_messages
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes.callbacks import understood
 from hydraulic_node_utils.nodes.guarded_lifecycle import guard_transitions
 from hydraulic_node_utils.nodes.serving import Served, serve
 from hydraulic_plant_node.pacing import release_realtime_for_all, request_realtime_for_all
@@ -117,10 +113,8 @@ class ControllerNode(Served, LifecycleNode):
     def _on_state(self, message: JointState) -> None:
         if self._state != "active":
             return
-        try:
-            sample = sample_from_messages(message)
-        except MessageError as error:
-            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+        sample = understood(self, "state", sample_from_messages, message)
+        if sample is None:
             return
         clock = self.get_clock()
         drive = self._session.answer(sample, clock.now().nanoseconds)
@@ -131,10 +125,9 @@ class ControllerNode(Served, LifecycleNode):
         self._heard = self._steady()
 
     def _on_reference(self, message: JointState) -> None:
-        try:
-            self._session.follow(reference_from_message(message))
-        except MessageError as error:
-            self.get_logger().warning(f"not a reference: {error}", throttle_duration_sec=1.0)
+        reference = understood(self, "reference", reference_from_message, message)
+        if reference is not None:
+            self._session.follow(reference)
 
     def _steady(self) -> float:
         """Seconds by which silence is measured: a simulation may run slower than the wall's clock."""

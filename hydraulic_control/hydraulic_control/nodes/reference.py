@@ -15,16 +15,16 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from hydraulic_control.errors import ControlError
 from hydraulic_control.nodes._reference_parameters import PARAMETERS
 from hydraulic_control.reference_run import ReferenceRun
 from hydraulic_control.trajectories import Limits
 from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE, absolute
-from hydraulic_interfaces.conversions import MessageError, ReferenceEncoder, sample_from_messages
+from hydraulic_interfaces.conversions import ReferenceEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
 from hydraulic_node_utils.nodes import diagnostics
+from hydraulic_node_utils.nodes.callbacks import trigger, understood
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
 
@@ -47,8 +47,8 @@ class ReferenceNode(ServedNode):
         self._end, self._failed = "idle", False
         self._heard = self._reported = time.monotonic()
         self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
-        self.create_service(Trigger, "~/start", self._on_start)
-        self.create_service(Trigger, "~/stop", self._on_stop)
+        trigger(self, "~/start", self._start)
+        trigger(self, "~/stop", self._stop)
 
     def watch(self) -> None:
         """What must happen without a message: notice silence, report health."""
@@ -75,10 +75,8 @@ class ReferenceNode(ServedNode):
         return ReferenceRun(v["kind"], v.values(), limits)
 
     def _on_state(self, message: JointState) -> None:
-        try:
-            sample = sample_from_messages(message)
-        except MessageError as error:
-            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+        sample = understood(self, "state", sample_from_messages, message)
+        if sample is None:
             return
         self._heard = time.monotonic()
         if self._armed is not None and self._reference.get_subscription_count():
@@ -118,25 +116,19 @@ class ReferenceNode(ServedNode):
         row = diagnostics.row(f"{absolute(REFERENCE_NODE)}: run", level, state, values, "reference")
         self._diagnostics.publish(diagnostics.array(self.get_clock().now().nanoseconds, row))
 
-    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _start(self) -> str:
         if self._run is not None or self._armed is not None:
-            response.message = "refused: a run is on, or waits to start"
-            return response
-        try:
-            self._armed = self._make()
-        except ControlError as error:
-            response.message = f"refused: {error}"
-            return response
-        response.success, response.message = True, f"starting {self._armed.kind}, {self._armed.duration:g} s"
-        return response
+            raise ControlError("a run is on, or waits to start")
+        self._armed = self._make()
+        return f"starting {self._armed.kind}, {self._armed.duration:g} s"
 
-    def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self._run is not None or self._armed is not None
+    def _stop(self) -> str:
+        if self._run is None and self._armed is None:
+            raise ControlError("nothing to stop")
         self._armed = None
         if self._run is not None:
             self._finish("broken off: asked to stop", failed=True)
-        response.message = "stopped" if response.success else "nothing to stop"
-        return response
+        return "stopped"
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -18,9 +18,10 @@ from sensor_msgs.msg import JointState
 
 from hydraulic_control.relay import Relay, RelaySettings
 from hydraulic_interfaces.contract import NAMESPACE, RELAY_NODE
-from hydraulic_interfaces.conversions import CommandEncoder, MessageError, sample_from_messages
+from hydraulic_interfaces.conversions import CommandEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.nodes.callbacks import understood
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
 from hydraulic_node_utils.parameter_spec import ParameterSpec
@@ -79,10 +80,8 @@ class RelayNode(ServedNode):
             self._command.wait_for_all_acked(Duration(seconds=1))
 
     def _on_state(self, message: JointState) -> None:
-        try:
-            sample = sample_from_messages(message)
-        except MessageError as error:
-            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+        sample = understood(self, "state", sample_from_messages, message)
+        if sample is None:
             return
         last, self._heard = self._stamp_ns, time.monotonic()
         if self._relay.done or (last is not None and sample.stamp_ns <= last):

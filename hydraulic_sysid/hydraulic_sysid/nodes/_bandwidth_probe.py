@@ -12,12 +12,12 @@ from collections.abc import Callable
 import numpy as np
 from rclpy.node import Node
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_interfaces.qos import profile
 from hydraulic_interfaces.samples import PlantSample
-from hydraulic_sysid.excitation import ExcitationError, Plan, load_plan
+from hydraulic_node_utils.nodes.callbacks import trigger
+from hydraulic_sysid.excitation import Plan, load_plan
 
 _CURVES = ("frequency", "response", "closed_loop", "coherence", "schema", "software")
 _MOST_MISSING = 0.01
@@ -25,14 +25,14 @@ FAILED = "failed"
 
 
 class BandwidthProbe:
-    """`start` begins a plan and says why not; `plan` tells which one."""
+    """`start` begins a plan or refuses it by an error; `plan` tells which one."""
 
-    def __init__(self, node: Node, plan: Callable[[], str], start: Callable[[Plan], str]) -> None:
+    def __init__(self, node: Node, plan: Callable[[], str], start: Callable[[Plan], None]) -> None:
         self._plan_source, self._start = plan, start
         self._plan: Plan | None = None
         self._rows: list[tuple[int, float, float]] = []
         self._result = node.create_publisher(String, "~/bandwidth", profile("latched"))
-        node.create_service(Trigger, "~/measure_bandwidth", self._on_measure)
+        trigger(node, "~/measure_bandwidth", self._measure)
 
     def take(self, plan: Plan, sample: PlantSample) -> None:
         """Keep a state of the run of `plan`, if that is the probe."""
@@ -47,18 +47,11 @@ class BandwidthProbe:
         content = _found(plan, rows) if finished else {"event": FAILED, "reason": reason}
         self._result.publish(String(data=json.dumps(content, allow_nan=False, ensure_ascii=False)))
 
-    def _on_measure(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            plan = load_plan(self._plan_source())
-            refused = self._start(plan)
-        except ExcitationError as error:
-            refused = str(error)
-        if refused:
-            response.message = f"refused: {refused}"
-            return response
+    def _measure(self) -> str:
+        plan = load_plan(self._plan_source())
+        self._start(plan)
         self._plan, self._rows = plan, []
-        response.success, response.message = True, f"probing for {plan.total_time:g} s; the result is on ~/bandwidth"
-        return response
+        return f"probing for {plan.total_time:g} s; the result is on ~/bandwidth"
 
 
 def _found(plan: Plan, rows: list[tuple[int, float, float]]) -> dict[str, object]:

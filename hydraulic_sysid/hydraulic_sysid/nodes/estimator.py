@@ -14,17 +14,17 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from hydraulic_interfaces.contract import ESTIMATOR_NODE, NAMESPACE
-from hydraulic_interfaces.conversions import MessageError, StateEncoder, sample_from_messages
+from hydraulic_interfaces.conversions import StateEncoder, sample_from_messages
 from hydraulic_interfaces.qos import STREAM_HISTORY, profile
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.nodes.callbacks import trigger, understood
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.linear.models import ArxOrder, IdentificationError
+from hydraulic_sysid.linear.models import ArxOrder
 from hydraulic_sysid.linear.online import LiveModel, RunningArx
 from hydraulic_sysid.nodes import _estimator_messages as messages
 
@@ -70,8 +70,8 @@ class Estimator(ServedNode):
         self._health = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
         self.create_subscription(JointState, "state", self._on_state, profile("state", STREAM_HISTORY))
         self.create_timer(HEALTH_S, self._tell_health)
-        self.create_service(Trigger, "~/reset_covariance", self._on_reset)
-        self.create_service(Trigger, "~/save", self._on_save)
+        trigger(self, "~/reset_covariance", self._reset)
+        trigger(self, "~/save", lambda: f"wrote {self._arx.save(self._table['save_to'])}")
         self._heard = self._reset_at = time.monotonic()
         self._reset_period = values["reset_period"]
         self._count = self._bad = 0
@@ -90,11 +90,11 @@ class Estimator(ServedNode):
             self._reset()
 
     def _on_state(self, message: JointState) -> None:
-        try:
-            self._take(sample_from_messages(message))
-        except MessageError as error:
+        sample = understood(self, "state", sample_from_messages, message)
+        if sample is None:
             self._bad += 1
-            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+        else:
+            self._take(sample)
 
     def _take(self, sample: PlantSample) -> None:
         self._heard, self._count = time.monotonic(), self._count + 1
@@ -119,21 +119,10 @@ class Estimator(ServedNode):
             figures |= {"model": self._live.plant.model.name, "restarts": self._live.restarts}
         self._health.publish(messages.health(text, silent, figures, self.get_clock().now().nanoseconds))
 
-    def _reset(self) -> None:
+    def _reset(self) -> str:
         self._arx.estimate.reset_covariance()
         self._reset_at = time.monotonic()
-
-    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._reset()
-        response.success, response.message = True, f"{self._arx.estimate.order.text} learns anew"
-        return response
-
-    def _on_save(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            response.success, response.message = True, f"wrote {self._arx.save(self._table['save_to'])}"
-        except (IdentificationError, OSError) as error:
-            response.success, response.message = False, f"not saved: {error}"
-        return response
+        return f"{self._arx.estimate.order.text} learns anew"
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -15,11 +15,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from hydraulic_interfaces.contract import EXCITATION_NODE, NAMESPACE
-from hydraulic_interfaces.conversions import CommandEncoder, MessageError, sample_from_messages
+from hydraulic_interfaces.conversions import CommandEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes.callbacks import trigger, understood
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
 from hydraulic_sysid.excitation import NOT_STARTED, ExcitationError, Phase, Plan, Session, load_plan
@@ -50,8 +50,8 @@ class ExcitationNode(ServedNode):
             self._arm(plan, self._table["start_timeout"] or math.inf)
         self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, profile("diagnostics"))
-        self.create_service(Trigger, "~/start", self._on_start)
-        self.create_service(Trigger, "~/abort", self._on_abort)
+        trigger(self, "~/start", self._start)
+        trigger(self, "~/abort", self._abort)
         self._probe = BandwidthProbe(self, lambda: self._table["probe"], self._begin)
 
     def watch(self) -> None:
@@ -97,10 +97,8 @@ class ExcitationNode(ServedNode):
         self.get_logger().info(self._session.last_end if self._session.ended else "started")
 
     def _on_state(self, message: JointState) -> None:
-        try:
-            sample = sample_from_messages(message)
-        except MessageError as error:
-            self.get_logger().warning(f"not a state: {error}", throttle_duration_sec=1.0)
+        sample = understood(self, "state", sample_from_messages, message)
+        if sample is None:
             return
         drive = self._session.answer(sample, time.monotonic())
         if self._session.run is not None:
@@ -113,29 +111,26 @@ class ExcitationNode(ServedNode):
             values = {pair.key: pair.value for pair in row.values}
             self._session.diagnose(row.name, row.level == DiagnosticStatus.OK, row.message, values)
 
-    def _begin(self, plan: Plan) -> str:
-        """Arm `plan` to start with the next state; empty, or why not."""
+    def _begin(self, plan: Plan) -> None:
+        """Arm `plan` to start with the next state.
+
+        :raises ExcitationError: it cannot start now.
+        """
         if self._session.busy:
-            return "a run is on, or waits to start"
-        obstacle = self._session.obstacle(time.monotonic())
-        if not obstacle:
-            self._arm(plan, math.inf)
-        return obstacle
+            raise ExcitationError("a run is on, or waits to start")
+        if obstacle := self._session.obstacle(time.monotonic()):
+            raise ExcitationError(obstacle)
+        self._arm(plan, math.inf)
 
-    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            plan = load_plan(self._table["plan"])
-            refused = self._begin(plan)
-        except ExcitationError as error:
-            refused = str(error)
-        response.success = not refused
-        response.message = f"refused: {refused}" if refused else f"starting {plan.name}, {plan.total_time:g} s"
-        return response
+    def _start(self) -> str:
+        plan = load_plan(self._table["plan"])
+        self._begin(plan)
+        return f"starting {plan.name}, {plan.total_time:g} s"
 
-    def _on_abort(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self._session.stop("asked to abort")
-        response.message = "stopping" if response.success else "nothing to abort"
-        return response
+    def _abort(self) -> str:
+        if not self._session.stop("asked to abort"):
+            raise ExcitationError("nothing to abort")
+        return "stopping"
 
 
 def main(argv: list[str] | None = None) -> int:
