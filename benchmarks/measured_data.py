@@ -18,7 +18,7 @@ import numpy as np
 from hydraulic_sysid.data.records import read_records
 from hydraulic_sysid.diagnosis.grey_box.valve_actuator import fit_valve_actuator
 from hydraulic_sysid.estimation import metrics
-from hydraulic_sysid.linear.identification import Settings, identify
+from hydraulic_sysid.linear.identification import IdentificationSettings, identify
 from hydraulic_sysid.linear.models import (
     Arx,
     ArxOrder,
@@ -82,7 +82,7 @@ def festo(folder: Path) -> None:
         records = read_records(folder / "mataveid_festo_hydraulics" / file, columns)
         print(f"  {file}, {drive} to {output}")
         for structure in (Arx(ArxOrder(3, 3, 1)), Arx(ArxOrder(3, 3, 1), True), TransferFunction(), StateSpace()):
-            settings = Settings(structure=structure, sampling_time=dt, input=drive, output=output)
+            settings = IdentificationSettings(structure=structure, sampling_time=dt, input=drive, output=output)
             try:
                 held = identify(records, settings=settings)["test"]
             except IdentificationError as error:

@@ -14,7 +14,7 @@ from hydraulic_sim.linear import closed_form
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import load_plan
-from hydraulic_sysid.linear.bandwidth import BandwidthError, from_model, from_record, from_rehearsal, from_response
+from hydraulic_sysid.linear.bandwidth import BandwidthError, from_model, from_record, from_response, from_simulation
 
 BENCH = "moog_mcr_m_1002_bench"
 
@@ -94,7 +94,7 @@ def test_a_probe_in_the_noise_is_refused() -> None:
 
 def test_friction_damps_what_a_probe_sees() -> None:
     model = load_model(BENCH)
-    found, _ = from_rehearsal(model, load_plan("probe"))
+    found, _ = from_simulation(model, load_plan("probe"))
     assert found.critical_gain > 1.5 * from_model(model).critical_gain
     assert found.velocity_gain == pytest.approx(from_model(model).velocity_gain, rel=0.02)
 

@@ -16,8 +16,8 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.excitation import ExcitationError, ExcitationRun, Phase, Plan, load_plan
 from hydraulic_sysid.excitation.amplitude import Limits, largest
 from hydraulic_sysid.excitation.design import SIGNALS, Wish, propose
-from hydraulic_sysid.excitation.rehearsal import Sensors, rehearse
 from hydraulic_sysid.excitation.signals.sine import Sine
+from hydraulic_sysid.excitation.simulated_run import Sensors, simulate_plan
 
 BENCH = "moog_mcr_m_1002_bench"
 WISH = Wish(0.5, 10.0, duration=9.0)
@@ -73,11 +73,11 @@ def test_the_amplitude_is_the_largest_within_the_limits(model, name: str, wish: 
     prediction = sized.plan.prediction
     assert prediction is not None
     assert prediction.limited_by == binds
-    used = limits.used(sized.rehearsal, 0.0)
+    used = limits.used(sized.simulated, 0.0)
     assert max(used.values()) == used[binds] <= 1.0
     assert used[binds] > 0.97
     larger = replace(sized.plan, signal=sized.plan.signal.scaled(1.15), amplitude_limit=10.0)
-    more = rehearse(larger, Plant(model))
+    more = simulate_plan(larger, Plant(model))
     assert limits.used(more, 0.0)[binds] > 1.0
 
 
@@ -86,7 +86,7 @@ def test_a_drive_limit_binds_where_nothing_else_does(model) -> None:  # noqa: AN
     sized = largest(propose("chirp", WISH), model, limits)
     assert sized.plan.prediction is not None and sized.plan.prediction.limited_by == "drive"
     assert sized.plan.amplitude_limit == 1.0
-    assert np.abs(sized.rehearsal.record["drive"]).max() == pytest.approx(1.0, rel=0.02)
+    assert np.abs(sized.simulated.record["drive"]).max() == pytest.approx(1.0, rel=0.02)
 
 
 def test_limits_that_leave_no_room_are_told(model) -> None:  # noqa: ANN001
@@ -101,9 +101,9 @@ def test_half_the_amplitude_on_request(model) -> None:  # noqa: ANN001
     assert half.prediction is not None and half.prediction.limited_by.startswith("50%")
 
 
-def test_a_rehearsal_is_the_plant_under_the_drive_that_it_records(model) -> None:  # noqa: ANN001
+def test_a_simulated_run_is_the_plant_under_the_drive_that_it_records(model) -> None:  # noqa: ANN001
     plan = load_plan("chirp")
-    played = rehearse(plan, Plant(model))
+    played = simulate_plan(plan, Plant(model))
     again = Plant(model).simulate(played.record["drive"], 1e-3)
     np.testing.assert_allclose(again.position, played.record["position"], atol=1e-9)
     assert played.extremes.position_max == pytest.approx(again.position.max(), abs=1e-9)
@@ -113,7 +113,7 @@ def test_a_rehearsal_is_the_plant_under_the_drive_that_it_records(model) -> None
 def test_sensors_add_their_noise_and_nothing_else(model) -> None:  # noqa: ANN001
     plan = propose("sine", Wish(1.0, 4.0, 4.0))
     plant = Plant(model)
-    quiet, noisy = rehearse(plan, plant), rehearse(plan, plant, Sensors(20e-6, 24e-6, 15e3, 1))
+    quiet, noisy = simulate_plan(plan, plant), simulate_plan(plan, plant, Sensors(20e-6, 24e-6, 15e3, 1))
     difference = noisy.record["position"] - quiet.record["position"]
     assert np.std(difference) == pytest.approx(np.hypot(20e-6, 24e-6 / np.sqrt(12.0)), rel=0.1)
     assert np.std(noisy.record["pressure_a"] - quiet.record["pressure_a"]) == pytest.approx(15e3, rel=0.1)
@@ -122,12 +122,12 @@ def test_sensors_add_their_noise_and_nothing_else(model) -> None:  # noqa: ANN00
 def test_an_approach_centres_the_piston_and_lifts_the_travel_limit(model) -> None:  # noqa: ANN001
     plan = replace(propose("sine", Wish(1.0, 4.0, 4.0)), travel_limit=0.1)
     assert plan.approach > 0.0
-    played = rehearse(plan, Plant(model), position=0.5)
+    played = simulate_plan(plan, Plant(model), position=0.5)
     assert not played.aborted
     arrived = played.record["position"][round(plan.approach * plan.rate)]
     assert abs(arrived) < 0.01
     stuck = replace(plan, approach_gain=0.0)
-    assert "the piston is at 0.5" in rehearse(stuck, Plant(model), position=0.5).aborted
+    assert "the piston is at 0.5" in simulate_plan(stuck, Plant(model), position=0.5).aborted
 
 
 def test_without_an_approach_a_run_is_as_before() -> None:
@@ -148,7 +148,7 @@ def test_the_plan_file_holds_its_prediction(model, tmp_path: Path, capsys: pytes
     plan = load_plan(out / "low_crest_multisine.yaml")
     assert plan.prediction is not None and plan.prediction.model == BENCH
     assert f"{plan.prediction.limited_by} allows no more" in " ".join(text.split())
-    again = rehearse(plan, Plant(model)).extremes
+    again = simulate_plan(plan, Plant(model)).extremes
     assert again.velocity_peak == pytest.approx(plan.prediction.velocity_peak)
     assert max(again.position_max, -again.position_min) <= 0.05
     document = json.loads((out / "design.json").read_text())

@@ -23,7 +23,7 @@ from hydraulic_sysid.linear.frequency_response import (
     periods_of,
     welch,
 )
-from hydraulic_sysid.linear.frequency_response.document import Settings, respond
+from hydraulic_sysid.linear.frequency_response.document import respond
 
 DT = 1e-3
 NUM, DEN = signal.butter(2, 20.0, fs=1.0 / DT)
@@ -181,7 +181,7 @@ def test_realisations_must_share_period_and_lines() -> None:
 
 def test_the_document_says_how_nonlinear_the_plant_is() -> None:
     plan = multisine(OddRandomPhaseMultisine, 3)
-    result = respond([record(plan, lambda u: linear(u) + 0.03 * linear(u) ** 3, 1e-4)], Settings(output="position"))
+    result = respond([record(plan, lambda u: linear(u) + 0.03 * linear(u) ** 3, 1e-4)], output="position")
     assert result["method"] == "bla"
     assert result["levels_db"]["odd_distortion"] > -40.0
     assert result["levels_db"]["even_distortion"] is None or result["levels_db"]["even_distortion"] < -60.0

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.linear.identification import Settings, identify
+from hydraulic_sysid.linear.identification import IdentificationSettings, identify
 from hydraulic_sysid.linear.models import Arx, ArxOrder, IdentificationError
 
 DT = 0.01
@@ -29,7 +29,7 @@ def plant(n: int, seed: int, noise: float) -> Record:
 
 
 def test_final_prediction_error_foresees_the_held_out_error() -> None:
-    settings = Settings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT, holdout=0.5)
+    settings = IdentificationSettings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT, holdout=0.5)
     result = identify([plant(8000, 1, 0.02)], settings=settings)
     assert result["test"]["mse_one_step"] == pytest.approx(result["test"]["fpe"], rel=0.1)
     assert result["test"]["fpe"] == pytest.approx(0.02**2, rel=0.1)
@@ -39,7 +39,7 @@ def test_final_prediction_error_foresees_the_held_out_error() -> None:
 
 
 def test_too_low_an_order_fails_the_residual_tests() -> None:
-    settings = Settings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT, holdout=0.5)
+    settings = IdentificationSettings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT, holdout=0.5)
     tests = identify([plant(8000, 2, 0.02)], settings=settings)["test"]["records"][0]["residual_tests"]
     assert np.mean(np.abs(tests["autocorrelation"][1:]) > tests["bound"]) > 0.3
 
@@ -47,7 +47,7 @@ def test_too_low_an_order_fails_the_residual_tests() -> None:
 def test_held_out_part_has_no_say_in_the_fit() -> None:
     first = plant(1000, 3, 0.02)
     spoilt = np.concatenate((first["position"][:800], np.random.default_rng(0).standard_normal(200)))
-    settings = Settings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT)
+    settings = IdentificationSettings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT)
     clean, dirty = (identify([r], settings=settings) for r in (first, record_of(spoilt, first["drive"])))
     assert clean["model"]["coefficients"] == dirty["model"]["coefficients"]
     assert dirty["test"]["best_fit_free_run"] < 50.0 < clean["test"]["best_fit_free_run"]
@@ -56,7 +56,7 @@ def test_held_out_part_has_no_say_in_the_fit() -> None:
 def test_unstable_model_is_called_unstable() -> None:
     u = np.random.default_rng(4).standard_normal(1500)
     y = lfilter([0.0, 1.0], [1.0, -1.05], u)
-    result = identify([record_of(y, u)], settings=Settings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT))
+    result = identify([record_of(y, u)], settings=IdentificationSettings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT))
     assert result["verdict"]["level"] == "off"
     assert "unstable (pole at |z| = 1.05)" in result["verdict"]["text"]
     assert np.isnan(result["test"]["best_fit_free_run"])
@@ -66,13 +66,13 @@ def test_unstable_model_is_called_unstable() -> None:
 @pytest.mark.parametrize(
     ("settings", "word"),
     [
-        (Settings(sampling_time=0.001), "shorter than the record's 0.01 s"),
-        (Settings(holdout=1.5), "between 0 and 1"),
-        (Settings(holdout=0.01), "too few"),
-        (Settings(output="pressure_a"), "no channel 'pressure_a'"),
+        (IdentificationSettings(sampling_time=0.001), "shorter than the record's 0.01 s"),
+        (IdentificationSettings(holdout=1.5), "between 0 and 1"),
+        (IdentificationSettings(holdout=0.01), "too few"),
+        (IdentificationSettings(output="pressure_a"), "no channel 'pressure_a'"),
     ],
 )
-def test_impossible_settings_say_why(settings: Settings, word: str) -> None:
+def test_impossible_settings_say_why(settings: IdentificationSettings, word: str) -> None:
     with pytest.raises(IdentificationError, match=word):
         identify([plant(500, 5, 0.0)], settings=settings)
 

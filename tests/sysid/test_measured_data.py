@@ -10,7 +10,7 @@ import pytest
 from hydraulic_sysid.data.records import read_records
 from hydraulic_sysid.diagnosis.grey_box.valve_actuator import fit_valve_actuator
 from hydraulic_sysid.estimation import metrics
-from hydraulic_sysid.linear.identification import Settings, identify
+from hydraulic_sysid.linear.identification import IdentificationSettings, identify
 from hydraulic_sysid.linear.models import Arx, ArxOrder, StateSpace, TransferFunction
 
 DATASETS = Path(os.environ.get("HYDRAULIC_DATASETS", "/nowhere"))
@@ -40,6 +40,8 @@ def test_the_crane_of_the_literature() -> None:
 def test_the_training_bench_in_free_run_and_one_step(file, columns, output, structure, free_run: float) -> None:
     """The last fifth, which the fit has not seen; one step ahead says little of a slow record, free run much."""
     records = read_records(DATASETS / "mataveid_festo_hydraulics" / file, columns)
-    held = identify(records, settings=Settings(structure=structure, sampling_time=0.1, output=output))["test"]
+    held = identify(records, settings=IdentificationSettings(structure=structure, sampling_time=0.1, output=output))[
+        "test"
+    ]
     assert held["best_fit_free_run"] > free_run
     assert held["best_fit_one_step"] > 95.0

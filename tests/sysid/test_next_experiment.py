@@ -31,7 +31,7 @@ from hydraulic_sysid.estimation.estimate import fit
 from hydraulic_sysid.excitation import Plan, load_plan
 from hydraulic_sysid.excitation.amplitude import largest
 from hydraulic_sysid.excitation.design import Wish, propose
-from hydraulic_sysid.excitation.rehearsal import Sensors, rehearse
+from hydraulic_sysid.excitation.simulated_run import Sensors, simulate_plan
 from hydraulic_sysid.report import render
 from hydraulic_sysid.verbs import next_experiment as verb
 
@@ -54,7 +54,7 @@ def truth(base: Model) -> Model:
 
 def played(plan: Plan, model: Model, seed: int, channels: tuple[str, ...] = ("position",)) -> Record:
     """A noisy record of a plan, of the part in which its signal plays."""
-    record = rehearse(plan, Plant(model), Sensors(NOISE["position"], seed=seed)).record
+    record = simulate_plan(plan, Plant(model), Sensors(NOISE["position"], seed=seed)).record
     part = record.window(plan.signal_start, plan.signal_start + plan.active_time)
     return Record.sampled(f"seed {seed}", part.dt, {c: part[c] for c in ("drive", *channels)})
 
@@ -106,7 +106,7 @@ def test_every_rival_keeps_the_limits_with_a_tenth_to_spare(
 ) -> None:
     limits = limits_of(old[0])
     for model in old[0].values():
-        seen = rehearse(proposal.plan, Plant(model))
+        seen = simulate_plan(proposal.plan, Plant(model))
         assert not seen.aborted
         assert seen.extremes.drive_peak <= limits.drive
         assert max(seen.extremes.position_max, -seen.extremes.position_min) <= 0.9 * limits.travel + 1e-9

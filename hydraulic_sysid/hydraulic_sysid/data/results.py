@@ -22,6 +22,7 @@ from hydraulic_node_utils.json_file import read_json
 FAMILY = "hydraulic_sysid."
 PAGE = "report.html"
 PAGE_MARK = "<!-- hydraulic_sysid report -->"
+EVERY_DIGIT = 17
 _DIGITS = 12
 _DIGITS_IN_ARRAYS = 6
 _LONG = 32
@@ -52,15 +53,15 @@ def plain(value: Any, digits: int = _DIGITS) -> Any:
     """The same content in JSON's own types; what is not finite becomes None.
 
     Single numbers and short lists keep twelve significant digits (a transfer function with a pole at 1 needs
-    them), arrays longer than ``_LONG`` six, which is finer than any sensor here.
+    them), arrays longer than ``_LONG`` six, which is finer than any sensor here; with `EVERY_DIGIT` nothing is rounded.
     """
     if isinstance(value, np.ndarray):
-        short = _DIGITS_IN_ARRAYS if value.size > _LONG else digits
+        short = _DIGITS_IN_ARRAYS if value.size > _LONG and digits < EVERY_DIGIT else digits
         if value.ndim == 1 and value.dtype.kind == "f":
             return [float(f"{v:.{short}g}") if math.isfinite(v) else None for v in value.tolist()]
         return plain(value.tolist(), short)
     if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
+        return {str(k): plain(v, digits) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [plain(v, digits) for v in value]
     if isinstance(value, bool | np.bool_):

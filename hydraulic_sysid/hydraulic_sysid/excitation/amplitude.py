@@ -12,7 +12,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
 from hydraulic_sysid.excitation.plan import Plan
 from hydraulic_sysid.excitation.prediction import Prediction
-from hydraulic_sysid.excitation.rehearsal import Rehearsal, rehearse
+from hydraulic_sysid.excitation.simulated_run import SimulatedRun, simulate_plan
 
 _TRAVEL_SHARE = 0.8
 _DRIVE_SHARE = 0.95
@@ -50,8 +50,8 @@ class Limits:
             pressure_max=1.25 * model.value("supply_pressure") if hydraulic else float("inf"),
         )
 
-    def used(self, seen: Rehearsal, centre: float) -> dict[str, float]:
-        """Which part of each limit a rehearsal uses; above 1 it breaks the limit.
+    def used(self, seen: SimulatedRun, centre: float) -> dict[str, float]:
+        """Which part of each limit a simulated run uses; above 1 it breaks the limit.
 
         Of the pressures it is the part of the way from where they begin.
         """
@@ -70,14 +70,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class Sized:
-    """A plan with its prediction, and the rehearsal behind it."""
+    """A plan with its prediction, and the simulated run behind it."""
 
     plan: Plan
-    rehearsal: Rehearsal
+    simulated: SimulatedRun
 
 
 def largest(plan: Plan, model: Model, limits: Limits | None = None, share: float = 1.0, cap: float = math.inf) -> Sized:
-    """`plan` with the largest amplitude at which its rehearsal on `model` breaks no limit, times `share`.
+    """`plan` with the largest amplitude at which its simulated run on `model` breaks no limit, times `share`.
 
     Found by bisection to 1 %; at most `cap` times what the plan has. The plan's travel and amplitude limits become
     those of `limits`, so that the run on the bench aborts where the prediction promised that it would not go.
@@ -122,27 +122,27 @@ def largest(plan: Plan, model: Model, limits: Limits | None = None, share: float
         if part > 1.0:
             raise ExcitationError(f"{plan.name}: at {share:.0%} of the largest amplitude {why} breaks")
     assert best is not None
-    prediction: Prediction = replace(best.rehearsal.extremes, limited_by=limit)
-    return Sized(replace(best.plan, prediction=prediction), best.rehearsal)
+    prediction: Prediction = replace(best.simulated.extremes, limited_by=limit)
+    return Sized(replace(best.plan, prediction=prediction), best.simulated)
 
 
 def _try(plan: Plan, plant: Plant, limits: Limits, factor: float) -> tuple[Sized | None, float, str]:
-    """The plan `factor` times as large and rehearsed; the largest part it uses of a limit, and of which."""
+    """The plan `factor` times as large and simulated; the largest part it uses of a limit, and of which."""
     try:
         signal = plan.signal.scaled(factor)
-        # The run stops a little beyond the limit that the rehearsal keeps: sensors are noisy.
+        # The run stops a little beyond the limit that the simulated run keeps: sensors are noisy.
         bounded = replace(plan, signal=signal, amplitude_limit=limits.drive, travel_limit=1.1 * limits.travel)
     except PlanError:
         return None, _TOO_MUCH, "drive"
     try:
-        rehearsal = rehearse(bounded, plant)
+        simulated = simulate_plan(bounded, plant)
     except SimulationError:
         return None, _TOO_MUCH, "the model, which no step follows there,"
-    parts = limits.used(rehearsal, plan.centre)
+    parts = limits.used(simulated, plan.centre)
     why = max(parts, key=lambda name: parts[name])
     # What was broken off has not shown how far it would have gone.
-    part = max(parts[why], _TOO_MUCH) if rehearsal.aborted else parts[why]
-    return Sized(bounded, rehearsal), part, why
+    part = max(parts[why], _TOO_MUCH) if simulated.aborted else parts[why]
+    return Sized(bounded, simulated), part, why
 
 
 def _peak(plan: Plan) -> float:

@@ -47,7 +47,7 @@ def document(
 
 
 def _plan(one: Sized, file: str) -> dict[str, Any]:
-    plan, record = one.plan, one.rehearsal.record
+    plan, record = one.plan, one.simulated.record
     assert plan.prediction is not None
     active = plan.open_loop[plan.envelope > 0.0]
     return {

@@ -9,11 +9,11 @@ from hydraulic_sysid.excitation.settings import Settings, number, text
 
 @dataclass(frozen=True)
 class Prediction(Settings):
-    """The extremes of a rehearsal of the plan on a model, and what kept its amplitude from being larger."""
+    """The extremes of the plan simulated on a model, and what kept its amplitude from being larger."""
 
     label = "prediction"
 
-    model: str = text("the model it was rehearsed on")
+    model: str = text("the model it was simulated on")
     drive_peak: float = number("V", "largest drive, centring included", minimum=0.0, maximum=1e3)
     position_min: float = number("m", "least position", minimum=-1e3, maximum=1e3)
     position_max: float = number("m", "greatest position", minimum=-1e3, maximum=1e3)

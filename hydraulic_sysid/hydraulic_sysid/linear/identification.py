@@ -1,4 +1,4 @@
-"""Identify a linear model from records and try it on held-out data: every figure in one document."""
+"""Identify a linear model from records and try it on test data: every figure in one document."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from .models import (
     IdentificationError,
     LinearModel,
     Structure,
-    TransferFunctionModel,
     best,
+    model_file,
     try_orders,
 )
 from .validation import residual_tests
@@ -33,7 +33,7 @@ _UNSTABLE = 1.01  # |z|; an estimated integrator may come out a little beyond 1
 
 
 @dataclass(frozen=True)
-class Settings:
+class IdentificationSettings:
     """What a user may choose about an identification."""
 
     structure: Structure = Arx()
@@ -58,7 +58,7 @@ class _Series:
 
 
 def identify(
-    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: Settings | None = None
+    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: IdentificationSettings | None = None
 ) -> dict[str, Any]:
     """Result document of a linear model fitted to ``records`` and tried on ``held_out``.
 
@@ -71,10 +71,10 @@ def identify(
 
 
 def identify_model(
-    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: Settings | None = None
+    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: IdentificationSettings | None = None
 ) -> tuple[dict[str, Any], LinearModel]:
     """As `identify`; the model too."""
-    settings = settings or Settings()
+    settings = settings or IdentificationSettings()
     if not records:
         raise IdentificationError("there is no record to identify from")
     if held_out is None:
@@ -91,8 +91,7 @@ def identify_model(
         structure = best(candidates, settings.select).structure
         tried = _orders(candidates)
     model = structure.fit(*data)
-    estimation = [_figures(model, s, noise_floor_of(s, settings)) for s in fit_on]
-    validation = [_figures(model, s, noise_floor_of(s, settings)) for s in try_on]
+    fit, test = ([_figures(model, s, settings.output) for s in data] for data in (fit_on, try_on))
     fpe = metrics.fpe(model.loss, model.parameters, model.samples)
     result = {
         **heading("identify", 3),
@@ -104,11 +103,11 @@ def identify_model(
             "input": {"channel": settings.input, "unit": records[0].unit(settings.input)},
             "output": {"channel": settings.output, "unit": records[0].unit(settings.output)},
         },
-        "verdict": _verdict(structure, model, validation),
+        "verdict": _verdict(structure, model, test),
         "model": _model_document(model),
         "orders": tried,
-        "fit": {**_pooled(estimation), "mse": model.loss, "fpe": fpe, "records": estimation},
-        "test": {**_pooled(validation), "fpe": fpe, "records": validation},
+        "fit": {**_pooled(fit), "mse": model.loss, "fpe": fpe, "records": fit},
+        "test": {**_pooled(test), "fpe": fpe, "records": test},
     }
     return result, model
 
@@ -148,17 +147,8 @@ def _orders(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
     ]
 
 
-def noise_floor_of(series: _Series, settings: Settings) -> float:
-    """Noise of the output as recorded."""
-    return noise_floor(series.record[settings.output])
-
-
-def _series(record: Record, settings: Settings) -> _Series:
-    for channel in (settings.input, settings.output):
-        if channel not in record:
-            raise IdentificationError(
-                f"{record.name}: no channel {channel!r}; the record has {', '.join(sorted(record.channels))}"
-            )
+def _series(record: Record, settings: IdentificationSettings) -> _Series:
+    record.require(settings.input, settings.output, error=IdentificationError)
     try:
         u = held_average(record[settings.input], record.dt, settings.sampling_time)
         y = sampled(record[settings.output], record.dt, settings.sampling_time)
@@ -173,37 +163,34 @@ def _series(record: Record, settings: Settings) -> _Series:
     return _Series(record, u, y)
 
 
-def _figures(model: LinearModel, series: _Series, noise: float) -> dict[str, Any]:
+def _figures(model: LinearModel, series: _Series, output: str) -> dict[str, Any]:
     free = model.simulate(series.u, series.y)
-    one = model.predict(series.u, series.y)
-    past = model.memory
     if not np.isfinite(free).all():
         free = np.full_like(series.y, np.nan)  # an unstable model has no free run worth a figure
-    runs = bool(np.isfinite(free).all())
-    residual = (series.y - one)[past:]
+    one = model.predict(series.u, series.y)
+    past = model.memory
+    y, u, ahead = series.y[past:], series.u[past:], one[past:]
     time = series.record.time[0] + model.dt * np.arange(series.y.size)
+    merits = {"best_fit": metrics.best_fit, "mse": metrics.mse, "r_squared": metrics.r_squared}
+    traces = {
+        "input": series.u,
+        "measured": series.y,
+        "free_run": free,
+        "one_step": one,
+        "free_run_error": series.y - free,
+        "one_step_error": series.y - one,
+    }
     return {
         "name": series.record.name,
         "source": str(series.record.source),
         "samples": series.y.size,
         "duration": series.y.size * model.dt,
-        "noise_std": noise,
-        "best_fit_free_run": metrics.best_fit(series.y, free) if runs else float("nan"),
-        "best_fit_one_step": _or_nan(metrics.best_fit, series.y[past:], one[past:]),
-        "mse_free_run": metrics.mse(series.y, free) if runs else float("nan"),
-        "mse_one_step": _or_nan(metrics.mse, series.y[past:], one[past:]),
-        "r_squared_free_run": metrics.r_squared(series.y, free) if runs else float("nan"),
-        "r_squared_one_step": _or_nan(metrics.r_squared, series.y[past:], one[past:]),
-        "residual_tests": residual_tests(residual, series.u[past:]) if np.isfinite(residual).all() else None,
-        "free_run_tests": residual_tests(series.y - free, series.u) if runs else None,
-        "traces": {
-            "input": trace(time, series.u),
-            "measured": trace(time, series.y),
-            "free_run": trace(time, free),
-            "one_step": trace(time, one),
-            "free_run_error": trace(time, series.y - free),
-            "one_step_error": trace(time, series.y - one),
-        },
+        "noise_std": noise_floor(series.record[output]),
+        **{f"{name}_free_run": _or_nan(merit, series.y, free) for name, merit in merits.items()},
+        **{f"{name}_one_step": _or_nan(merit, y, ahead) for name, merit in merits.items()},
+        "residual_tests": residual_tests(y - ahead, u) if np.isfinite(ahead).all() else None,
+        "free_run_tests": residual_tests(series.y - free, series.u) if np.isfinite(free).all() else None,
+        "traces": {name: trace(time, values) for name, values in traces.items()},
     }
 
 
@@ -213,47 +200,25 @@ def _or_nan(figure: Callable[[Array, Array], float], measured: Array, predicted:
 
 
 def _pooled(parts: Sequence[dict[str, Any]]) -> dict[str, float]:
-    """Mean square errors over all held-out samples, and the smallest and the mean best fit of the records."""
+    """Mean square errors over all samples, and the mean and the smallest best fit of the records."""
     samples = [p["samples"] for p in parts]
     return {
         "samples": int(sum(samples)),
-        "mse_one_step": float(np.average([p["mse_one_step"] for p in parts], weights=samples)),
-        "mse_free_run": float(np.average([p["mse_free_run"] for p in parts], weights=samples)),
-        "best_fit_free_run": float(np.mean([p["best_fit_free_run"] for p in parts])),
-        "best_fit_one_step": float(np.mean([p["best_fit_one_step"] for p in parts])),
+        **{k: float(np.average([p[k] for p in parts], weights=samples)) for k in ("mse_one_step", "mse_free_run")},
+        **{k: float(np.mean([p[k] for p in parts])) for k in ("best_fit_free_run", "best_fit_one_step")},
         "worst_best_fit_free_run": float(min(p["best_fit_free_run"] for p in parts)),
     }
 
 
 def _model_document(model: LinearModel) -> dict[str, Any]:
-    numerator, denominator = model.transfer_function()
-    continuous = isinstance(model, TransferFunctionModel)
     return {
         "type": type(model).__name__.removesuffix("Model"),
         "coefficients": [
             {"name": name, "value": value, "standard_error": error} for name, value, error in model.coefficients()
         ],
-        "minimised": model.minimised,
-        "parameters": model.parameters,
-        "input_offset": model.input_offset,
-        "output_offset": model.output_offset,
-        "transfer_function": {
-            "numerator": numerator,
-            "denominator": denominator,
-            "domain": "continuous" if continuous else "discrete",
-            "sampling_time": model.dt,
-            "delay": model.delay if isinstance(model, TransferFunctionModel) else 0.0,
-        },
-        "poles": [
-            {
-                "real": p.value.real,
-                "imaginary": p.value.imag,
-                "natural_frequency_hz": p.natural_frequency,
-                "damping": p.damping,
-                "stable": p.stable,
-            }
-            for p in model.poles()
-        ],
+        **{k: getattr(model, k) for k in ("minimised", "parameters", "input_offset", "output_offset")},
+        "transfer_function": model_file.transfer_function(model),
+        "poles": model_file.poles(model),
         "condition_number": getattr(model, "condition_number", None),
         "singular_values": getattr(model, "singular_values", None),
     }
@@ -268,11 +233,11 @@ def _verdict(structure: Structure, model: LinearModel, validation: Sequence[dict
     if max(growth) > _UNSTABLE or not np.isfinite(fits).all():
         text = (
             f"{name} is unstable (pole at |z| = {max(growth):.3g}): its free run says "
-            f"nothing, one step ahead it fits held-out data to {one_step:.1f} %. Try another sampling time or "
+            f"nothing, one step ahead it fits test data to {one_step:.1f} %. Try another sampling time or "
             "order, or a richer drive."
         )
         return {"level": "off", "text": text}
-    where = "held-out data" if len(fits) == 1 else f"{len(fits)} held-out records (mean; worst {min(fits):.1f} %)"
+    where = "test data" if len(fits) == 1 else f"{len(fits)} test records (mean; worst {min(fits):.1f} %)"
     text = f"{name} fits {where} to {np.mean(fits):.1f} % in free run and {one_step:.1f} % one step ahead."
     level = "explained" if min(fits) >= 95.0 else "close" if min(fits) >= 80.0 else "off"
     return {"level": level, "text": text}

@@ -9,7 +9,7 @@ from std_msgs.msg import Header
 from hydraulic_interfaces.contract import ESTIMATOR_NODE, absolute
 from hydraulic_interfaces.conversions import to_time
 from hydraulic_node_utils.nodes import diagnostics
-from hydraulic_sysid.linear.models.recursive import RecursiveArx, Step
+from hydraulic_sysid.linear.models.recursive_arx import RecursiveArx, Step
 from hydraulic_sysid.linear.online import RunningFit
 
 

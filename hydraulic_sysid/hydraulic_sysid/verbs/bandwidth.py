@@ -52,7 +52,7 @@ def _bandwidth(options: argparse.Namespace, say: opt.Say) -> opt.Done:
         source = {"kind": "model", "name": model.name, "path": str(model.path or "")}
         if options.probe:
             source["kind"] = "simulation"
-            found, coherence = bandwidth.from_rehearsal(model, load_plan(options.probe))
+            found, coherence = bandwidth.from_simulation(model, load_plan(options.probe))
         else:
             found = bandwidth.from_model(model, options.position)
     else:

@@ -1,6 +1,6 @@
 """Design an excitation from the actuator's bandwidth, as large as its limits allow on the model.
 
-The amplitude is the largest at which neither drive, travel, velocity nor pressures leave their limits in a rehearsal on
+The amplitude is the largest at which neither drive, travel, velocity nor pressures leave their limits in a simulated on
 the model. Writes the plan, with what the model does under it, for the excitation node; design.json and a page.
 """
 
@@ -20,7 +20,7 @@ from hydraulic_sysid.excitation import load_plan, save_plan
 from hydraulic_sysid.excitation.amplitude import Limits, Sized, largest
 from hydraulic_sysid.excitation.design import SIGNALS, Wish, propose
 from hydraulic_sysid.excitation.design_document import document
-from hydraulic_sysid.linear.bandwidth import from_model, from_rehearsal
+from hydraulic_sysid.linear.bandwidth import from_model, from_simulation
 from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
@@ -61,7 +61,7 @@ def _design(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     model = load_model(options.model)
     bandwidth = options.bandwidth
     if options.probe:
-        bandwidth = from_rehearsal(model, load_plan(options.probe))[0].position
+        bandwidth = from_simulation(model, load_plan(options.probe))[0].position
     elif bandwidth is None and options.band is None:
         bandwidth = from_model(model, options.centre).position
     low, high = options.band or (options.share[0] * bandwidth, options.share[1] * bandwidth)
@@ -71,7 +71,7 @@ def _design(options: argparse.Namespace, say: opt.Say) -> opt.Done:
         names = [f"{options.signal}_{number}" for number in range(1, options.realisations + 1)]
     files = [f"{name}.yaml" for name in names]
     opt.check_new(options.out, *files, what="plan")
-    say("rehearsing on the model")
+    say("simulating")
     sized: list[Sized] = []
     for number, name in enumerate(names):
         wish = Wish(low, high, options.duration, options.rate, options.seed + number)

@@ -8,14 +8,13 @@ the empirical transfer function beside it. Writes frequency_response.json and a 
 from __future__ import annotations
 
 import argparse
-from dataclasses import fields
 from typing import Any
 
 from rich.console import Console
 
 from hydraulic_node_utils import tables
 from hydraulic_sysid.data.display import number
-from hydraulic_sysid.linear.frequency_response.document import METHODS, Settings, respond
+from hydraulic_sysid.linear.frequency_response.document import METHODS, respond
 from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
@@ -39,8 +38,8 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _respond(options: argparse.Namespace, say: opt.Say) -> opt.Done:
-    settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
-    return opt.Done(respond(opt.read_records(options), settings))
+    names = ("method", "input", "output", "period", "start", "segment", "width")
+    return opt.Done(respond(opt.read_records(options), **{name: getattr(options, name) for name in names}))
 
 
 def _show(result: dict[str, Any], console: Console) -> None:

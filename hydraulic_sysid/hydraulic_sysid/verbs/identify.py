@@ -84,7 +84,7 @@ def _identify(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     records = opt.read_records(options)
     held_out = opt.read_held_out(options.holdout_record, options) or None
     own = max(r.dt for r in [*records, *(held_out or [])])
-    settings = identification.Settings(
+    settings = identification.IdentificationSettings(
         structure=structure,
         sampling_time=options.sampling_time or (own if options.model == "tf" else max(0.05, own)),
         holdout=options.holdout,

@@ -87,6 +87,12 @@ class Record:
             there = ", ".join(self.channels)
             raise ChannelError(f"{self.name} has no channel {channel!r}; it has {there}") from None
 
+    def require(self, *channels: str, error: type[Exception] = ChannelError) -> None:
+        """Raise ``error`` where one of these channels is missing, naming those there are."""
+        for channel in channels:
+            if channel not in self:
+                raise error(f"{self.name}: no channel {channel!r}; the record has {', '.join(sorted(self.channels))}")
+
     def __len__(self) -> int:
         return int(self.time.size)
 

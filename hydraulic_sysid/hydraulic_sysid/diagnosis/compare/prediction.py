@@ -56,12 +56,7 @@ def check(record: Record, horizon: float) -> None:
 
     :raises ComparisonError: naming the record and what it lacks.
     """
-    for channel in ("drive", "position"):
-        if channel not in record:
-            raise ComparisonError(
-                f"{record.name}: no channel {channel!r}; a comparison needs drive and position, "
-                f"the record has {', '.join(sorted(record.channels))}"
-            )
+    record.require("drive", "position", error=ComparisonError)
     if horizon < 10.0 * record.dt:
         raise ComparisonError(f"{record.name}: horizon {horizon:g} s is shorter than ten samples of {record.dt:g} s")
     if record.duration < 2.0 * horizon:

@@ -20,8 +20,8 @@ from scipy.optimize import least_squares
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation.jit import jit
 from hydraulic_sysid.linear.models import IdentificationError, TransferFunctionOrder, fit_transfer_function
+from hydraulic_sysid.linear.models.experiments import experiments, lengths_agree
 from hydraulic_sysid.linear.models.order_selection import information_criteria
-from hydraulic_sysid.linear.models.series import experiments, lengths_agree
 
 KNOTS = (3, 5, 7, 9, 11)
 _SUBSTEPS = 4

@@ -151,9 +151,7 @@ def _names(model: Model, records: Sequence[Record]) -> tuple[str, ...]:
     if not records:
         raise LocateError("there is no record to form balances of")
     for record in records:
-        for channel in ("drive", "position"):
-            if channel not in record:
-                raise LocateError(f"{record.name}: no channel {channel!r}; balances need drive and position")
+        record.require("drive", "position", error=LocateError)
         if record.duration < _SHORTEST:
             raise LocateError(f"{record.name}: {record.duration:g} s long; balances need at least {_SHORTEST:g} s")
     shared = set.intersection(*(set(r.channels) for r in records))

@@ -14,7 +14,7 @@ from hydraulic_sysid.data.decimation import trace
 from hydraulic_sysid.data.display import number
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.excitation import Plan
-from hydraulic_sysid.excitation.rehearsal import Rehearsal
+from hydraulic_sysid.excitation.simulated_run import SimulatedRun
 
 from .movements import FAMILIES
 from .reference import MARGIN, Played
@@ -39,7 +39,7 @@ class Design:
     chosen: Sequence[Candidate]
     played: Played
     plan: Plan
-    seen: Sequence[Rehearsal]
+    seen: Sequence[SimulatedRun]
     limited_by: str
     refits: Sequence[Refit]
 
@@ -175,7 +175,7 @@ def _verdict(design: Design) -> dict[str, str]:
     return {"level": level, "text": text[:1].upper() + text[1:]}
 
 
-def _traced(seen: Rehearsal, channel: str) -> dict[str, Any]:
+def _traced(seen: SimulatedRun, channel: str) -> dict[str, Any]:
     return trace(seen.record.time, seen.record[channel], _POINTS)
 
 

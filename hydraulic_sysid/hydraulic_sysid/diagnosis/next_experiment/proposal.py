@@ -15,7 +15,7 @@ from hydraulic_sysid.estimation.segments import MEASURED
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.amplitude import Limits
 from hydraulic_sysid.excitation.prediction import Prediction
-from hydraulic_sysid.excitation.rehearsal import Rehearsal
+from hydraulic_sysid.excitation.simulated_run import SimulatedRun
 
 from . import plan_file
 from .document import CLEAR, Design, document
@@ -24,7 +24,7 @@ from .evidence import Point
 from .movements import Bench, Movement
 from .reference import Leader, Played, play
 from .search import Candidate, Search
-from .verify import Refit, refits, rehearsals
+from .verify import Refit, refits, simulated_runs
 
 _MOVEMENT_S = 5.0  # about the time of one movement
 _MOST_MOVEMENTS = 6
@@ -58,7 +58,7 @@ class _Tried:
     chosen: list[Candidate]
     played: Played
     plan: Plan
-    seen: list[Rehearsal]
+    seen: list[SimulatedRun]
     limited_by: str
     refits: list[Refit]
 
@@ -143,7 +143,7 @@ def _try(search: Search, chosen: list[Candidate], say: Say) -> _Tried:
             try:
                 played = play(lead.plant, leader, movements, bench)
                 plan = plan_file.make(played, search.limits, bench.centre, bench.rate, Path(folder), _words(movements))
-                seen, part, limit = rehearsals(plan, rivals, search.limits, bench.centre)
+                seen, part, limit = simulated_runs(plan, rivals, search.limits, bench.centre)
             except SimulationError:
                 part, limit = 2.0, "the model"
             if part <= 1.0:

@@ -16,7 +16,7 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.estimate import Fit, Settings, fit_pieces
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.amplitude import Limits
-from hydraulic_sysid.excitation.rehearsal import Rehearsal, rehearse
+from hydraulic_sysid.excitation.simulated_run import SimulatedRun, simulate_plan
 
 from .evidence import Pair, Point, pieces
 from .reference import used
@@ -63,14 +63,14 @@ class Refit:
         return dict(zip(self.channels, (squares / max(float(squares.sum()), 1e-300)).tolist(), strict=True))
 
 
-def rehearsals(
+def simulated_runs(
     plan: Plan, points: Sequence[Point], limits: Limits, centre: float
-) -> tuple[list[Rehearsal], float, str]:
+) -> tuple[list[SimulatedRun], float, str]:
     """The plan played on every rival by the code that plays it on the bench; the largest part of a limit that is used,
     and of which. Raises `hydraulic_sim.errors.SimulationError`."""
     found, worst, limit = [], 0.0, ""
     for point in points:
-        seen = rehearse(plan, point.plant)
+        seen = simulate_plan(plan, point.plant)
         rest = (float(seen.record["pressure_a"][0]), float(seen.record["pressure_b"][0]))
         parts = used(limits, seen.extremes, rest, centre)
         if seen.aborted and max(parts.values()) <= 1.0:
@@ -85,12 +85,12 @@ def rehearsals(
 def refits(
     points: Sequence[Point],
     chosen: Sequence[Pair],
-    seen: Sequence[Rehearsal],
+    seen: Sequence[SimulatedRun],
     plan: Plan,
     noise: Mapping[str, float],
     length: float,
 ) -> list[Refit]:
-    """Every pair of ``chosen``, the first of it by its rehearsal in ``seen``. Raises as a calibration does."""
+    """Every pair of ``chosen``, the first of it by its simulated run in ``seen``. Raises as a calibration does."""
     records = [_played(s.record, plan, list(noise)) for s in seen]
 
     def fitted(number: int, record: Record, keys: Sequence[str]) -> Fit:
@@ -120,6 +120,6 @@ def _refit(pair: Pair, done: Fit, own: float, record: Record) -> Refit:
 
 
 def _played(record: Record, plan: Plan, channels: Sequence[str]) -> Record:
-    """The part of a rehearsal in which the signal plays, with the channels that are measured."""
+    """The part of a simulated run in which the signal plays, with the channels that are measured."""
     part = record.window(plan.signal_start, plan.signal_start + plan.active_time)
     return Record.sampled(record.name, part.dt, {c: part[c] for c in ("drive", *channels)})

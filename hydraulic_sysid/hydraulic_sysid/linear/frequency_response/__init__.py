@@ -1,7 +1,7 @@
 """Frequency responses: empirical transfer function, Welch with coherence, best linear approximation."""
 
+from hydraulic_sysid.linear.errors import FrequencyResponseError
 from hydraulic_sysid.linear.frequency_response.bla import BestLinearApproximation, best_linear_approximation
-from hydraulic_sysid.linear.frequency_response.errors import FrequencyResponseError
 from hydraulic_sysid.linear.frequency_response.periodic import Periods, periods_of
 from hydraulic_sysid.linear.frequency_response.spectral import Spectral, etfe, welch
 

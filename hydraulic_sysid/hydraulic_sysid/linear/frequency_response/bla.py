@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array, Complex, Index
+from hydraulic_sysid.linear.errors import FrequencyResponseError
 
-from .errors import FrequencyResponseError
 from .periodic import Periods
 
 

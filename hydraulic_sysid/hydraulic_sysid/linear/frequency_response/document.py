@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,9 @@ from hydraulic_sim.arrays import Array, Complex
 from hydraulic_sysid.data.display import number
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
+from hydraulic_sysid.linear.errors import FrequencyResponseError
 
 from .bla import BestLinearApproximation, Lines, best_linear_approximation
-from .errors import FrequencyResponseError
 from .periodic import Periods, periodic_signal, periods_of
 from .spectral import Spectral, etfe, welch
 
@@ -25,53 +24,48 @@ _POINTS = 600
 _LINEAR_DB, _CLOSE_DB = -40.0, -20.0
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What a user may choose; `segment` [s] and `width` [Hz] follow from the record unless given."""
-
-    method: str = "auto"
-    input: str = "drive"
-    output: str = "position"
-    period: float | None = None
-    start: float = 0.0
-    segment: float | None = None
-    width: float | None = None
-
-
-def respond(records: Sequence[Record], settings: Settings | None = None) -> dict[str, Any]:
+def respond(
+    records: Sequence[Record],
+    *,
+    method: str = "auto",
+    input: str = "drive",
+    output: str = "position",
+    period: float | None = None,
+    start: float = 0.0,
+    segment: float | None = None,
+    width: float | None = None,
+) -> dict[str, Any]:
     """Result document: best linear approximation of periodic records, Welch's and the empirical estimate of others.
 
     Several records of one period and one set of lines are realisations; of others only one at a time is taken.
+    ``segment`` [s] and ``width`` [Hz] follow from the record unless given.
 
     :raises FrequencyResponseError: no record, a channel missing, no whole periods, too short.
     """
-    settings = settings or Settings()
     if not records:
         raise FrequencyResponseError("there is no record")
     for record in records:
-        for channel in (settings.input, settings.output):
-            if channel not in record:
-                there = ", ".join(sorted(record.channels))
-                raise FrequencyResponseError(f"{record.name}: no channel {channel!r}; the record has {there}")
-    periodic = settings.period is not None or all(periodic_signal(r) is not None for r in records)
-    method = ("bla" if periodic else "welch") if settings.method == "auto" else settings.method
+        record.require(input, output, error=FrequencyResponseError)
+    if method == "auto":
+        method = "bla" if period is not None or all(periodic_signal(r) is not None for r in records) else "welch"
     if method == "welch" and len(records) > 1:
         raise FrequencyResponseError(f"{len(records)} records: without periods one record is taken at a time")
+    first = records[0]
     content: dict[str, Any] = {"lines": None, "odd_lines": None, "even_lines": None, "levels_db": None}
     if method == "bla":
-        cut = [periods_of(r, settings.output, settings.input, settings.period, settings.start) for r in records]
-        content |= _periodic(cut, settings.output == "position")
-    content |= _spectral(records[0], settings)
+        cut = [periods_of(r, output, input, period, start) for r in records]
+        content |= _periodic(cut, output == "position")
+    content |= _spectral(first, input, output, segment, width)
     text, level = _verdict(content, method)
     return {
         **heading("frequency_response", 2),
         "verdict": {"level": level, "text": text},
-        "title": f"Frequency response of {records[0].name}",
+        "title": f"Frequency response of {first.name}",
         "model": {"name": ", ".join(r.name for r in records)},
         "method": method,
         "settings": {
-            "input": {"channel": settings.input, "unit": records[0].unit(settings.input)},
-            "output": {"channel": settings.output, "unit": records[0].unit(settings.output)},
+            "input": {"channel": input, "unit": first.unit(input)},
+            "output": {"channel": output, "unit": first.unit(output)},
         },
         "records": [
             {"name": r.name, "source": str(r.source), "duration": r.duration, "sampling_time": r.dt} for r in records
@@ -145,7 +139,7 @@ def _ratio(power: Array, reference: Array, weight: Array) -> float | None:
 
 def _linear_fit_limit(found: BestLinearApproximation, levels: dict[str, float | None]) -> float | None:
     """Best fit [%] that a linear model can reach on the played lines and those beside them: what of the output's
-    amplitude is neither distortion nor noise. None where distortion was not told."""
+    amplitude is neither distortion nor noise. None where distortion was not measured."""
     played = float(np.sum(found.output**2))
     if found.odd is not None and found.even is not None:
         # On the lines that are played lies as much odd distortion as on the odd lines beside them.
@@ -158,13 +152,13 @@ def _linear_fit_limit(found: BestLinearApproximation, levels: dict[str, float | 
     return 100.0 * (1.0 - float(np.sqrt(wrong / played)))
 
 
-def _spectral(record: Record, settings: Settings) -> dict[str, Any]:
+def _spectral(record: Record, input: str, output: str, segment: float | None, width: float | None) -> dict[str, Any]:
     """Welch's and the empirical estimate of a record; the output is taken to be that of an integrating plant where it
     is a position."""
-    u, y, dt = record[settings.input], record[settings.output], record.dt
-    integrating = settings.output == "position"
-    segment = settings.segment or max(round(record.duration / _SEGMENTS / dt), 16) * dt
-    width = settings.width or _SMOOTHED / record.duration
+    u, y, dt = record[input], record[output], record.dt
+    integrating = output == "position"
+    segment = segment or max(round(record.duration / _SEGMENTS / dt), 16) * dt
+    width = width or _SMOOTHED / record.duration
     by_segments = welch(u, y, dt, segment, integrating=integrating)
     whole = etfe(u, y, dt, width, integrating=integrating)
     return {
@@ -192,7 +186,7 @@ def _verdict(content: dict[str, Any], method: str) -> tuple[str, str]:
             return "No frequency has a coherence of 0.9: drive and output hardly belong together.", "off"
         f = np.asarray(content["welch"]["frequency"])[trusted]
         text = f"Coherence of 0.9 and more from {number(f.min())} to {number(f.max())} Hz"
-        return f"{text}. Noise and distortion lower it alike; a multisine of whole periods tells them apart.", "close"
+        return f"{text}. Noise and distortion lower it alike; a multisine of whole periods separates them.", "close"
     levels = content["levels_db"]
     parts = [
         f"{word} distortion {_words(levels[key])}"
@@ -207,7 +201,7 @@ def _verdict(content: dict[str, Any], method: str) -> tuple[str, str]:
     if content["linear_fit_limit"] is not None:
         text += f" No linear model can fit this output to better than {content['linear_fit_limit']:.2f} %."
     elif len(parts) == 1:
-        text += " Distortion is not told apart: play an odd multisine, or several realisations."
+        text += " Distortion is not separated from noise: play an odd multisine, or several realisations."
     worst = max(known, default=-np.inf)
     return text, "explained" if worst < _LINEAR_DB else "close" if worst < _CLOSE_DB else "off"
 

@@ -11,8 +11,7 @@ import numpy as np
 from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import ExcitationError, Plan
-
-from .errors import FrequencyResponseError
+from hydraulic_sysid.linear.errors import FrequencyResponseError
 
 _PART = 0.02  # of a period, over which drift from one period to the next is averaged
 _PLAYED = 0.05  # of the strongest line: what is stronger was played, where no plan tells
@@ -53,11 +52,7 @@ def periods_of(
 
     :raises FrequencyResponseError: no period is known, it is no whole number of samples, or fewer than two fit in.
     """
-    for channel in (drive, output):
-        if channel not in record:
-            raise FrequencyResponseError(
-                f"{record.name}: no channel {channel!r}; the record has {', '.join(sorted(record.channels))}"
-            )
+    record.require(drive, output, error=FrequencyResponseError)
     known = periodic_signal(record)
     harmonics, end = None, record.duration
     if period is None:

@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike
 from scipy import signal
 
 from hydraulic_sim.arrays import Array, Complex, Mask
-
-from .errors import FrequencyResponseError
+from hydraulic_sysid.linear.errors import FrequencyResponseError
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,20 @@
 """Linear models identified from records: sampled and continuous, by least squares, instruments and prediction error."""
 
+from hydraulic_sysid.linear.errors import IdentificationError
+
 from .arx import ArxModel, ArxOrder, fit_arx
-from .continuous_fit import fit_transfer_function
-from .errors import IdentificationError
-from .instruments import fit_arx_instruments
+from .experiments import OFFSETS
+from .instrumental_variables import fit_arx_instruments
 from .model import LinearModel
 from .model_file import read_linear_model, write_linear_model
 from .order_selection import CRITERIA, Candidate, best, try_orders
 from .poles import Pole
-from .recursive import RecursiveArx
-from .series import OFFSETS
+from .recursive_arx import RecursiveArx
 from .state_space import StateSpaceModel
 from .structures import Arx, StateSpace, Structure, TransferFunction
 from .subspace import fit_state_space
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
+from .transfer_function_fit import fit_transfer_function
 
 __all__ = [
     "ArxModel",

@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.linear.errors import IdentificationError
 
-from .errors import IdentificationError
+from .experiments import experiments, lengths_agree
+from .free_run import free_run
+from .model import coefficient_table
 from .poles import Pole, sampled_poles
-from .series import experiments, lengths_agree
-from .tall import solve
-
-_OVERFLOW = 1e8
+from .tall_least_squares import solve
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,7 @@ class ArxModel:
     def coefficients(self) -> list[tuple[str, float, float]]:
         """Name, value and standard error of every estimated coefficient."""
         names = [f"a{i + 1}" for i in range(self.order.na)] + [f"b{i + 1}" for i in range(self.order.nb)]
-        values = [*self.a, *self.b]
-        if self.standard_errors.size > len(values):
-            names, values = [*names, "c"], [*values, self.constant]
-        return [(n, float(v), float(e)) for n, v, e in zip(names, values, self.standard_errors, strict=True)]
+        return coefficient_table(names, [*self.a, *self.b], self.constant, self.standard_errors)
 
     def transfer_function(self) -> tuple[Array, Array]:
         """Numerator and denominator in descending powers of z, for ``control.TransferFunction(num, den, dt)``."""
@@ -125,30 +122,19 @@ class ArxModel:
         return np.concatenate((head, past @ theta + self.constant + self.output_offset))
 
     def simulate(self, drive: ArrayLike, output: ArrayLike | None = None) -> Array:
-        """Free run ``(N,)`` on the drive alone.
-
-        The initial state is the one that fits the measured ``output`` best (least squares over the whole
-        record, as MATLAB's ``compare`` does by default), or rest at the output offset if no output is given.
-        NaN throughout if the model is too unstable to be run.
-        """
+        """Free run ``(N,)`` on the drive alone (see `free_run`), from rest at the output offset without ``output``."""
         u = np.asarray(drive, dtype=float) - self.input_offset
+        y = None if output is None else lengths_agree(drive, output)[1]
         den = np.concatenate(([1.0], self.a))
         num = np.concatenate((np.zeros(self.order.nk), self.b))
-        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model is told apart below
-            forced = lfilter(num, den, u) + lfilter([1.0], den, np.full(u.size, self.constant))
-            forced = forced + self.output_offset
-        if output is None:
-            return forced
-        _, y = lengths_agree(drive, output)
-        if not np.isfinite(forced).all() or np.abs(forced).max() > _OVERFLOW:
-            return np.full(u.size, np.nan)
-        size = self.order.state_size
-        # States of an unstable model grow beyond what a least-squares fit can weigh.
-        modes = np.stack([lfilter(num, den, np.zeros(u.size), zi=unit)[0] for unit in np.eye(size)], axis=1)
-        if not np.abs(modes).max() < _OVERFLOW:
-            return np.full(u.size, np.nan)
-        state, *_ = np.linalg.lstsq(modes, y - forced, rcond=None)
-        return forced + modes @ state
+        with np.errstate(over="ignore", invalid="ignore"):
+            forced = lfilter(num, den, u) + lfilter([1.0], den, np.full(u.size, self.constant)) + self.output_offset
+
+        def modes() -> Array:
+            units = np.eye(self.order.state_size)
+            return np.stack([lfilter(num, den, np.zeros(u.size), zi=unit)[0] for unit in units], axis=1)
+
+        return free_run(forced, y, modes)
 
 
 def fit_arx(

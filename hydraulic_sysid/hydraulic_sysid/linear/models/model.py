@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from numpy.typing import ArrayLike
@@ -60,3 +61,11 @@ class LinearModel(Protocol):
 
     def coefficients(self) -> list[tuple[str, float, float]]:
         """Name, value and standard error (NaN where there is none) of every coefficient."""
+
+
+def coefficient_table(
+    names: Sequence[str], values: Sequence[float], constant: float, errors: Array
+) -> list[tuple[str, float, float]]:
+    """Rows of `LinearModel.coefficients`; the constant c is one of them where there is a standard error for it."""
+    rows = zip([*names, "c"], [*values, constant], errors, strict=False)
+    return [(name, float(value), float(error)) for name, value, error in rows]

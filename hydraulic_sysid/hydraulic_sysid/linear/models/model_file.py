@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from hydraulic_node_utils.json_file import read_json
-from hydraulic_sysid.data.results import write_text
+from hydraulic_sysid.data.results import EVERY_DIGIT, plain, write_text
+from hydraulic_sysid.linear.errors import IdentificationError
 
 from .arx import ArxModel, ArxOrder
-from .errors import IdentificationError
 from .model import LinearModel
 from .state_space import StateSpaceModel
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
@@ -32,35 +32,42 @@ _KINDS: dict[type, str] = {
 
 def document(model: LinearModel, **about: Any) -> dict[str, Any]:
     """The file's content; ``about``: further keys (name, input, output, quality, …) that come first."""
+    orders = (ArxOrder, TransferFunctionOrder)
+    return {
+        "format": FORMAT,
+        **about,
+        "structure": _KINDS[type(model)],
+        **transfer_function(model),
+        "poles": poles(model),
+        "estimate": {k: dict(vars(v)) if isinstance(v, orders) else v for k, v in vars(model).items()},
+    }
+
+
+def transfer_function(model: LinearModel) -> dict[str, Any]:
+    """Domain, sampling time, numerator, denominator and dead time of a model."""
     numerator, denominator = model.transfer_function()
-    kind = _KINDS[type(model)]
     continuous = isinstance(model, TransferFunctionModel)
-    return _finite(
+    return {
+        "domain": "continuous" if continuous else "discrete",
+        "sampling_time": model.dt,
+        "numerator": numerator,
+        "denominator": denominator,
+        "delay": model.delay if isinstance(model, TransferFunctionModel) else 0.0,
+    }
+
+
+def poles(model: LinearModel) -> list[dict[str, Any]]:
+    """The poles of a model, slowest first."""
+    return [
         {
-            "format": FORMAT,
-            **about,
-            "structure": kind,
-            "domain": "continuous" if continuous else "discrete",
-            "sampling_time": model.dt,
-            "numerator": numerator,
-            "denominator": denominator,
-            "delay": model.delay if isinstance(model, TransferFunctionModel) else 0.0,
-            "poles": [
-                {
-                    "real": p.value.real,
-                    "imaginary": p.value.imag,
-                    "natural_frequency_hz": p.natural_frequency,
-                    "damping": p.damping,
-                    "stable": p.stable,
-                }
-                for p in model.poles()
-            ],
-            "estimate": {
-                key: value if not isinstance(value, ArxOrder | TransferFunctionOrder) else dict(vars(value))
-                for key, value in vars(model).items()
-            },
+            "real": p.value.real,
+            "imaginary": p.value.imag,
+            "natural_frequency_hz": p.natural_frequency,
+            "damping": p.damping,
+            "stable": p.stable,
         }
-    )
+        for p in model.poles()
+    ]
 
 
 def write_linear_model(path: Path, model: LinearModel, **about: Any) -> Path:
@@ -69,7 +76,8 @@ def write_linear_model(path: Path, model: LinearModel, **about: Any) -> Path:
     :raises IdentificationError: something else lies there.
     """
     check_place(path)
-    write_text(path, json.dumps(document(model, **about), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+    content = plain(document(model, **about), EVERY_DIGIT)
+    write_text(path, json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
     return path
 
 
@@ -121,16 +129,3 @@ def read_linear_model(path: Path) -> tuple[LinearModel, dict[str, Any]]:
 
 def _flat(value: list[Any]) -> bool:
     return not any(isinstance(v, list) for v in value)
-
-
-def _finite(value: Any) -> Any:
-    """JSON's own types, every digit kept; what is not finite becomes None."""
-    if isinstance(value, dict):
-        return {str(k): _finite(v) for k, v in value.items()}
-    if isinstance(value, np.ndarray):
-        return _finite(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    if isinstance(value, np.generic):
-        return _finite(value.item())
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation import metrics
+from hydraulic_sysid.linear.errors import IdentificationError
 
-from .errors import IdentificationError
 from .model import LinearModel
 from .structures import Structure, fit_on_equal_samples
 

@@ -16,11 +16,10 @@ from scipy.signal import ss2tf
 
 from hydraulic_sim.arrays import Array
 
+from .experiments import lengths_agree
+from .free_run import free_run
 from .poles import Pole, poles_at
-from .recursion import propagate
-from .series import lengths_agree
-
-_OVERFLOW = 1e8
+from .state_recursion import propagate
 
 
 @dataclass(frozen=True)
@@ -81,11 +80,7 @@ class StateSpaceModel:
         return num[0, first:], den
 
     def simulate(self, drive: ArrayLike, output: ArrayLike | None = None) -> Array:
-        """Free run ``(N,)`` on the drive alone.
-
-        The initial state is the one that fits the measured ``output`` best over the whole record, or 0 if no output
-        is given. NaN throughout if the model is too unstable to be run.
-        """
+        """Free run ``(N,)`` on the drive alone (see `free_run`), from the state 0 without ``output``."""
         u = np.asarray(drive, dtype=float) - self.input_offset
         y = None if output is None else lengths_agree(drive, output)[1] - self.output_offset
         return self._run(self.A, np.outer(u, self.B) + self.constant, self.D * u, y) + self.output_offset
@@ -108,15 +103,7 @@ class StateSpaceModel:
         transition = np.ascontiguousarray(transition)
         with np.errstate(over="ignore", invalid="ignore"):
             forced = propagate(transition, forcing, np.zeros(self.order)) @ self.C + direct
-        if not np.isfinite(forced).all() or np.abs(forced).max() > _OVERFLOW:
-            return np.full(forced.size, np.nan)
-        if measured is None:
-            return forced
-        modes = free_modes(transition, self.C, forced.size)
-        if not np.abs(modes).max() < _OVERFLOW:
-            return np.full(forced.size, np.nan)
-        state, *_ = np.linalg.lstsq(modes, measured - forced, rcond=None)
-        return forced + modes @ state
+        return free_run(forced, measured, lambda: free_modes(transition, self.C, forced.size))
 
 
 def free_modes(transition: Array, C: Array, count: int) -> Array:

@@ -2,47 +2,55 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hydraulic_sysid.linear.errors import IdentificationError
+
 from .arx import ArxOrder, fit_arx
-from .continuous_fit import fit_transfer_function
-from .errors import IdentificationError
-from .instruments import fit_arx_instruments
+from .instrumental_variables import fit_arx_instruments
 from .model import LinearModel
 from .subspace import fit_state_space
 from .transfer_function import TransferFunctionOrder
+from .transfer_function_fit import fit_transfer_function
 
 Arrays = Sequence[ArrayLike]
 
 
-class Structure(Protocol):
+class Structure(ABC):
     """A model structure of a certain order."""
 
     @property
+    @abstractmethod
     def text(self) -> str:
         """Its name for people, ``ARX(3, 3, 1)``."""
 
     @property
     def memory(self) -> int:
         """Samples at the beginning of each experiment that the fit has no error for."""
+        return 0
 
+    @abstractmethod
     def fit(self, drives: Arrays, outputs: Arrays, dt: float, offsets: str) -> LinearModel:
         """The model of these experiments; raises `IdentificationError`."""
 
+    @abstractmethod
     def document(self) -> dict[str, Any]:
         """Kind and orders, for result documents and model files."""
 
+    @abstractmethod
     def up_to(self) -> list[Structure]:
         """All structures of the kind up to this order, the simplest first."""
 
 
 @dataclass(frozen=True)
-class Arx:
+class Arx(Structure):
     """ARX, by least squares or, with ``instruments``, by instrumental variables."""
 
     order: ArxOrder = ArxOrder(3, 3, 1)
@@ -64,27 +72,19 @@ class Arx:
 
     def document(self) -> dict[str, Any]:
         """See `Structure.document`."""
-        order = {"na": self.order.na, "nb": self.order.nb, "nk": self.order.nk}
-        return {
-            "structure": "arx",
-            "method": "instrumental variables" if self.instruments else "least squares",
-            **order,
-        }
+        method = "instrumental variables" if self.instruments else "least squares"
+        return {"structure": "arx", "method": method, **vars(self.order)}
 
     def up_to(self) -> list[Structure]:
         """See `Structure.up_to`; the dead time from 1 (or 0, where that is asked for) on."""
         o = self.order
-        orders = [
-            ArxOrder(na, nb, nk)
-            for na in range(1, o.na + 1)
-            for nb in range(1, o.nb + 1)
-            for nk in range(min(1, o.nk), o.nk + 1)
-        ]
-        return [replace(self, order=order) for order in sorted(orders, key=lambda x: (x.na + x.nb, x.na, x.nk))]
+        ranges = range(1, o.na + 1), range(1, o.nb + 1), range(min(1, o.nk), o.nk + 1)
+        orders = sorted(product(*ranges), key=lambda x: (x[0] + x[1], x[0], x[2]))
+        return [replace(self, order=ArxOrder(*order)) for order in orders]
 
 
 @dataclass(frozen=True)
-class TransferFunction:
+class TransferFunction(Structure):
     """Continuous-time transfer function with a known dead time [s], by output error or SRIVC."""
 
     order: TransferFunctionOrder = TransferFunctionOrder()
@@ -96,11 +96,6 @@ class TransferFunction:
         """See `Structure.text`."""
         return self.order.text + (f", dead time {self.delay * 1e3:g} ms" if self.delay else "")
 
-    @property
-    def memory(self) -> int:
-        """See `Structure.memory`."""
-        return 0
-
     def fit(self, drives: Arrays, outputs: Arrays, dt: float, offsets: str) -> LinearModel:
         """See `Structure.fit`."""
         return fit_transfer_function(
@@ -109,8 +104,7 @@ class TransferFunction:
 
     def document(self) -> dict[str, Any]:
         """See `Structure.document`."""
-        order = {"poles": self.order.poles, "zeros": self.order.zeros, "integrator": self.order.integrator}
-        return {"structure": "transfer function", "method": self.method, **order, "delay": self.delay}
+        return {"structure": "transfer function", "method": self.method, **vars(self.order), "delay": self.delay}
 
     def up_to(self) -> list[Structure]:
         """See `Structure.up_to`; an integrator stays."""
@@ -122,7 +116,7 @@ class TransferFunction:
 
 
 @dataclass(frozen=True)
-class StateSpace:
+class StateSpace(Structure):
     """Sampled state space by a subspace method; ``direct``: the input acts without delay."""
 
     states: int = 3
@@ -133,11 +127,6 @@ class StateSpace:
     def text(self) -> str:
         """See `Structure.text`."""
         return f"state space with {self.states} state{'s' if self.states > 1 else ''}"
-
-    @property
-    def memory(self) -> int:
-        """See `Structure.memory`."""
-        return 0
 
     def fit(self, drives: Arrays, outputs: Arrays, dt: float, offsets: str) -> LinearModel:
         """See `Structure.fit`."""

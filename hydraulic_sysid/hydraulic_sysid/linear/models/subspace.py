@@ -22,12 +22,12 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve_discrete_are
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.linear.errors import IdentificationError
 
-from .errors import IdentificationError
-from .recursion import propagate
-from .series import experiments
+from .experiments import experiments
+from .state_recursion import propagate
 from .state_space import StateSpaceModel, free_modes
-from .tall import triangle
+from .tall_least_squares import triangle
 
 Pairs = Sequence[tuple[Array, Array]]
 _HORIZON = 15

@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.linear.errors import IdentificationError
 
-from .derivatives import Filter
-from .errors import IdentificationError
+from .experiments import lengths_agree
+from .free_run import free_run
+from .held_filter import Filter
+from .model import coefficient_table
 from .poles import Pole, continuous_poles
-from .series import lengths_agree
-
-_OVERFLOW = 1e8
 
 
 @dataclass(frozen=True)
@@ -109,10 +109,9 @@ class TransferFunctionModel:
         return continuous_poles(self.denominator)
 
     def simulate(self, drive: ArrayLike, output: ArrayLike | None = None, dt: float | None = None) -> Array:
-        """Free run ``(N,)`` on the drive alone, sampled every ``dt`` seconds (as the estimation data by default).
+        """Free run ``(N,)`` on the drive alone (see `free_run`), from rest at the output offset without ``output``.
 
-        The initial state is the one that fits the measured ``output`` best over the whole record, or rest at the
-        output offset if no output is given. NaN throughout if the model is too unstable to be run.
+        Sampled every ``dt`` seconds, as the estimation data by default.
         """
         u = np.asarray(drive, dtype=float) - self.input_offset
         dt = dt or self.dt
@@ -125,17 +124,8 @@ class TransferFunctionModel:
             forced = filters.held(u, self.delay / dt).single[:, self.order.zeros :: -1] @ beta
             if self.constant:
                 forced += filters.held(np.ones(u.size)).single[:, 0] * (self.constant / scale**n)
-        if not np.isfinite(forced).all() or np.abs(forced).max() > _OVERFLOW:
-            return np.full(u.size, np.nan)
-        if output is None:
-            return forced + self.output_offset
-        _, y = lengths_agree(drive, output)
-        modes = filters.impulse(u.size).single[:, :n]
-        if not np.abs(modes).max() < _OVERFLOW:
-            return np.full(u.size, np.nan)
-        lengths = np.linalg.norm(modes, axis=0)
-        state, *_ = np.linalg.lstsq(modes / lengths, y - self.output_offset - forced, rcond=None)
-        return forced + modes @ (state / lengths) + self.output_offset
+        y = None if output is None else lengths_agree(drive, output)[1] - self.output_offset
+        return free_run(forced, y, lambda: filters.impulse(u.size).single[:, :n]) + self.output_offset
 
     def predict(self, drive: ArrayLike, output: ArrayLike) -> Array:
         """One-step prediction ``(N,)``; the first ``memory`` values are NaN (no past error)."""
@@ -149,9 +139,7 @@ class TransferFunctionModel:
         """Name, value and standard error of every estimated coefficient."""
         names = [f"a{i + 1}" for i in range(self.order.free_poles)] + [f"b{i}" for i in range(self.order.zeros + 1)]
         values = [*self.denominator[1 : 1 + self.order.free_poles], *self.numerator]
-        if self.standard_errors.size > len(values):
-            names, values = [*names, "c"], [*values, self.constant]
-        return [(n, float(v), float(e)) for n, v, e in zip(names, values, self.standard_errors, strict=True)]
+        return coefficient_table(names, values, self.constant, self.standard_errors)
 
     def _scale(self) -> float:
         """The fastest pole [rad/s], at least one per 10⁶ samples."""

@@ -1,8 +1,8 @@
 """Estimation while the bench runs: slower sampling of a stream, a running fit, the model beside the plant."""
 
-from .fit import RunningFit
 from .live_model import LiveModel
 from .running_arx import RunningArx
-from .sampling import SlowSample, SlowSampler
+from .running_fit import RunningFit
+from .slow_sampler import SlowSample, SlowSampler
 
 __all__ = ["LiveModel", "RunningArx", "RunningFit", "SlowSample", "SlowSampler"]

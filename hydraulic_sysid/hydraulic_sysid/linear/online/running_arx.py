@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from hydraulic_sysid.linear.models import ArxOrder, IdentificationError, RecursiveArx, write_linear_model
-from hydraulic_sysid.linear.models.recursive import Step
+from hydraulic_sysid.linear.models.recursive_arx import Step
 
-from .fit import RunningFit
-from .sampling import SlowSampler
+from .running_fit import RunningFit
+from .slow_sampler import SlowSampler
 
 UNITS = {"position": "m", "velocity": "m/s", "force": "N"}
 """What can be modelled, and its unit."""

@@ -20,7 +20,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.resampling import held_average, sampled
 from hydraulic_sysid.estimation import metrics
-from hydraulic_sysid.linear.models.errors import IdentificationError
+from hydraulic_sysid.linear.errors import IdentificationError
 from hydraulic_sysid.linear.models.model import LinearModel
 
 SHAPES: dict[str, Callable[[Array], Array]] = {

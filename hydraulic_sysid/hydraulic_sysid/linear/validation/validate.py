@@ -82,10 +82,7 @@ def validate(
 
 def _check(record: Record, subjects: Mapping[str, Subject]) -> None:
     for name, subject in subjects.items():
-        for channel in (subject.input, subject.output):
-            if channel not in record:
-                there = ", ".join(sorted(record.channels))
-                raise IdentificationError(f"{record.name}: no channel {channel!r}; the record has {there}")
+        record.require(subject.input, subject.output, error=IdentificationError)
         if subject.model.dt < record.dt * (1.0 - 1e-9):
             raise IdentificationError(
                 f"{record.name} is sampled every {record.dt:g} s, {name} needs {subject.model.dt:g} s"

@@ -75,8 +75,8 @@ def analyse(records: list[Record], held_out: list[Record], model: Model, out: Pa
     identified, left_out = None, ""
     try:
         # A record sampled more slowly than usual is identified at its own sampling time.
-        sampling = max(identification.Settings().sampling_time, *(r.dt for r in records))
-        settings = identification.Settings(sampling_time=sampling)
+        sampling = max(identification.IdentificationSettings().sampling_time, *(r.dt for r in records))
+        settings = identification.IdentificationSettings(sampling_time=sampling)
         identified = identification.identify(records, held_out or None, settings)
         results.write_result(out, identified)
     except IdentificationError as error:

@@ -1,4 +1,4 @@
-"""The plans of the study on a plant: through the node graph, or rehearsed on the model without one."""
+"""The plans of the study on a plant: through the node graph, or simulated on the model without one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import Plan, save_plan
-from hydraulic_sysid.excitation.rehearsal import Sensors, rehearse
+from hydraulic_sysid.excitation.simulated_run import Sensors, simulate_plan
 
 SENSORS = Sensors(
     position_noise=online.SENSORS["position_noise"],
@@ -43,13 +43,13 @@ def through_the_graph(plans: Sequence[Plan], model: Path, plant: str, out: Path,
 
 
 def on_the_model(plans: Sequence[Plan], model: Model, steps: Steps) -> dict[str, Record]:
-    """Rehearse the plans with the sensors of the simulator; plan's name → record.
+    """Simulate the plans with the sensors of the simulator; plan's name → record.
 
     :raises SimulationError: the model cannot follow.
     """
     plant = Plant(model)
     records = {}
     for plan in plans:
-        records[plan.name] = rehearse(plan, plant, SENSORS).record
+        records[plan.name] = simulate_plan(plan, plant, SENSORS).record
         steps.tick()
     return records

@@ -16,7 +16,7 @@ from hydraulic_sysid.excitation.signals.sawtooth import Sawtooth
 from hydraulic_sysid.excitation.signals.sine import Sine
 from hydraulic_sysid.excitation.signals.square import Square
 from hydraulic_sysid.excitation.signals.triangle import Triangle
-from hydraulic_sysid.linear.identification import Settings, identify_model
+from hydraulic_sysid.linear.identification import IdentificationSettings, identify_model
 from hydraulic_sysid.linear.models import LinearModel, TransferFunctionOrder
 from hydraulic_sysid.linear.models.structures import Arx, TransferFunction
 from hydraulic_sysid.linear.validation import Grid
@@ -26,8 +26,10 @@ BANDS = {"in": (0.1, 2.0), "below": (0.01, 0.1), "above": (2.0, 20.0)}
 KINDS = {"chirp": "chirp", "multisine": "three_tones"}
 """The paper's excitations and the designs that make them."""
 IDENTIFICATION = {
-    "chirp": Settings(structure=Arx(), sampling_time=0.05, holdout=0.2),
-    "multisine": Settings(structure=TransferFunction(TransferFunctionOrder(3, 0)), sampling_time=0.01, holdout=0.5),
+    "chirp": IdentificationSettings(structure=Arx(), sampling_time=0.05, holdout=0.2),
+    "multisine": IdentificationSettings(
+        structure=TransferFunction(TransferFunctionOrder(3, 0)), sampling_time=0.01, holdout=0.5
+    ),
 }
 """ARX(3, 3, 1) every 50 ms on the first 80 %; third-order transfer function on the first half."""
 DURATION_S, SHORT_S = 50.0, 8.0

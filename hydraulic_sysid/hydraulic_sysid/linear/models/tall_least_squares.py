@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-
-from .errors import IdentificationError
+from hydraulic_sysid.linear.errors import IdentificationError
 
 _BLOCK = 1024
 _CHUNK = 64 * _BLOCK

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.linear.errors import IdentificationError
 
 from .arx import ArxModel, ArxOrder, fit_arx, regressors
-from .errors import IdentificationError
+from .experiments import experiments
 from .noise_model import autoregression
-from .series import experiments
 
 
 def fit_arx_instruments(

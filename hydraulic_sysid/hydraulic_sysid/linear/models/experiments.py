@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hydraulic_sim.arrays import Array
-
-from .errors import IdentificationError
+from hydraulic_sysid.linear.errors import IdentificationError
 
 OFFSETS = ("estimate", "remove", "none")
 

@@ -16,8 +16,8 @@ from scipy.linalg import block_diag
 
 from hydraulic_sim.arrays import Array
 
-from .derivatives import Filter
-from .separable import Point, Problem, evaluate
+from .held_filter import Filter
+from .output_error import Point, Problem, evaluate
 
 
 def refined_iv(problem: Problem, cutoff: float, iterations: int = 20, tolerance: float = 1e-4) -> Point | None:

@@ -29,8 +29,8 @@ class Sensors:
 
 
 @dataclass(frozen=True)
-class Rehearsal:
-    """The record of a rehearsal, and why it was broken off (empty if it was not).
+class SimulatedRun:
+    """The record of a simulated run, and why it was broken off (empty if it was not).
 
     `extremes` are those of the plant itself, without the sensors' noise.
     """
@@ -40,7 +40,9 @@ class Rehearsal:
     extremes: Prediction
 
 
-def rehearse(plan: Plan, plant: Plant, sensors: Sensors | None = None, position: float | None = None) -> Rehearsal:
+def simulate_plan(
+    plan: Plan, plant: Plant, sensors: Sensors | None = None, position: float | None = None
+) -> SimulatedRun:
     """Play `plan` on `plant`, which starts at rest at `position` [m] (by default at the plan's centre).
 
     As on the bench, a drive answers a state and acts from the next one on.
@@ -83,5 +85,5 @@ def rehearse(plan: Plan, plant: Plant, sensors: Sensors | None = None, position:
     for name in ("pressure_a", "pressure_b", "pressure_supply"):
         columns[name] += sensors.pressure_noise * draw.standard_normal(done)
     columns["spool"] *= plant.value("spool_travel")
-    description = {"experiment": {"event": STARTED, "plan": plan.as_mapping()}, "notes": ["rehearsed on a model"]}
-    return Rehearsal(Record.sampled(plan.name, dt, columns, description=description), run.reason, extremes)
+    description = {"experiment": {"event": STARTED, "plan": plan.as_mapping()}, "notes": ["simulated on a model"]}
+    return SimulatedRun(Record.sampled(plan.name, dt, columns, description=description), run.reason, extremes)

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.linear.errors import IdentificationError
 
-from .derivatives import Derivatives, Filter
-from .errors import IdentificationError
+from .held_filter import Derivatives, Filter
 
 _GROWTH = 3.0  # an unstable mode may grow by e³ over a record: an integrator's estimate, no more
 

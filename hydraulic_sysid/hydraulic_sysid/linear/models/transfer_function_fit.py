@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.linear.errors import IdentificationError
 
-from .errors import IdentificationError
+from .experiments import experiments
 from .noise_model import fit_noise
-from .refined_iv import refined_iv
-from .separable import Point, Problem, refine
-from .series import experiments
+from .output_error import Point, Problem, refine
+from .srivc import refined_iv
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
 
 METHODS = ("output error", "srivc")

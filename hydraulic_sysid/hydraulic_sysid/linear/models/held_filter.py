@@ -17,7 +17,7 @@ from scipy.linalg import expm
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.resampling import delayed
 
-from .recursion import propagate
+from .state_recursion import propagate
 
 
 @dataclass(frozen=True)

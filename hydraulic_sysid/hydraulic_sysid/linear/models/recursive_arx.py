@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.linear.errors import IdentificationError
 
 from .arx import ArxModel, ArxOrder
-from .errors import IdentificationError
 from .poles import Pole, sampled_poles
 
 _STILL = 6.0  # an output that spans less, in standard deviations of the error, stands still
