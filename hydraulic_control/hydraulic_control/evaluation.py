@@ -14,7 +14,7 @@ from hydraulic_control.identified import IdentifiedModel
 from hydraulic_control.response import Response, step_figures, tracking_figures
 from hydraulic_control.scenario import Case, identified, nominal, scattered
 from hydraulic_control.simulation import QUIET, SensorNoise, run
-from hydraulic_control.trajectories import Limits, make
+from hydraulic_control.trajectories import MotionLimits, make
 from hydraulic_control.tuning import Criteria, figures_of, try_step
 from hydraulic_sim.model import Model
 
@@ -22,7 +22,7 @@ ALIKE = 0.15
 """Identified and nonlinear model agree when a figure differs by no more than this part …"""
 RESOLVED = {"rise_time": 2e-3, "settling_time": 5e-3, "overshoot": 0.2}
 """… or by no more than what two runs on a bench would differ: s, s, %."""
-_LIMITS = Limits(travel=10.0, velocity=10.0, acceleration=1e3)
+_LIMITS = MotionLimits(travel=10.0, velocity=10.0, acceleration=1e3)
 
 
 def respond(values: Mapping[str, Any], case: Case, kind: str, settings: Mapping[str, Any]) -> Response:

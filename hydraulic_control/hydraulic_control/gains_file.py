@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from ruamel.yaml.error import YAMLError
 from hydraulic_control.errors import ControlError
 from hydraulic_control.parameters import SPECS, check
 from hydraulic_interfaces.contract import CONTROLLER_NODE, absolute
+from hydraulic_interfaces.errors import HydraulicError
 
 FOLDER = Path(__file__).parent / "gains"
 NODE = absolute(CONTROLLER_NODE)
@@ -32,15 +34,10 @@ def shipped() -> tuple[str, ...]:
 
 def find(name_or_path: str | Path) -> Path:
     """The file of that path, or the shipped one of that name. Raises `ControlError` where there is none."""
-    path = Path(name_or_path)
-    if path.is_file():
-        return path
-    own = FOLDER / f"{name_or_path}.yaml"
-    if str(name_or_path) in shipped():
-        return own
-    raise ControlError(
-        f"{name_or_path}: no such parameter file; shipped are {', '.join(shipped()) or 'none'}, or give a path"
-    )
+    for path in (Path(name_or_path), FOLDER / f"{name_or_path}.yaml"):
+        if path.is_file():
+            return path
+    raise ControlError(f"{name_or_path}: no such parameter file; shipped are {', '.join(shipped())}, or give a path")
 
 
 def load(name_or_path: str | Path) -> dict[str, Any]:
@@ -57,8 +54,8 @@ def load(name_or_path: str | Path) -> dict[str, Any]:
     if not isinstance(rows, dict):
         raise ControlError(f"{path}: has no {NODE} with ros__parameters")
     try:
-        return {name: check(name, value) for name, value in _flat(rows).items() if name not in ("use_sim_time",)}
-    except ControlError as error:
+        return {name: check(name, value) for name, value in _flat(rows).items() if name != "use_sim_time"}
+    except HydraulicError as error:
         raise ControlError(f"{path}: {error}") from None
 
 
@@ -71,8 +68,6 @@ def text(values: Mapping[str, Any], remarks: str) -> str:
         rows.yaml_add_eol_comment(f"{spec.unit}; {spec.description}" if spec.unit else spec.description, name)
     document = CommentedMap({NODE: CommentedMap({"ros__parameters": rows})})
     document.yaml_set_start_comment(remarks)
-    from io import StringIO
-
     stream = StringIO()
     writer = YAML()
     writer.width = 200

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hydraulic_control.identified import IdentifiedModel
 from hydraulic_control.relay import CriticalPoint
+from hydraulic_sim.arrays import Complex
 from hydraulic_sim.linear import linearise
 from hydraulic_sim.model import Model
 
@@ -15,8 +16,6 @@ LOOP_DELAY_S = 1.5e-3
 """From a sample to the middle of the interval over which the drive that answers it acts: one period to get there, half
 a period of hold, at 1 kHz."""
 _LOWEST, _HIGHEST, _POINTS = 0.05, 3000.0, 6000  # rad/s
-
-Complex = NDArray[np.complex128]
 
 
 def grid(highest: float = _HIGHEST) -> NDArray[np.float64]:

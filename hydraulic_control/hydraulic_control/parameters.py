@@ -22,15 +22,18 @@ from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 CONTROLLERS = ("npid", "pid", "pole_placement")
 ANTIWINDUP = ("none", "back_calculation", "conditional_integration")
-CHOICES: dict[str, tuple[str, ...]] = {"controller": CONTROLLERS, "antiwindup": ANTIWINDUP}
 
 
 def _live(name: str, default: float, text: str, unit: str, low: float, high: float) -> ParameterSpec:
     return ParameterSpec(name, default, text, unit, low, high, live=True)
 
 
+def _choice(name: str, default: str, choices: tuple[str, ...], text: str) -> ParameterSpec:
+    return ParameterSpec(name, default, text, live=True, choices=choices)
+
+
 LAW: tuple[ParameterSpec, ...] = (
-    ParameterSpec("controller", "npid", f"law: {', '.join(CONTROLLERS)} (pid is npid with k = 1)", live=True),
+    _choice("controller", "npid", CONTROLLERS, f"law: {', '.join(CONTROLLERS)} (pid is npid with k = 1)"),
     _live("kp", 60.0, "proportional gain", "V/m", 0.0, 1e5),
     _live("ki", 0.0, "integral gain", "V/(m*s)", 0.0, 1e6),
     _live("kd", 0.0, "derivative gain, on the measured position", "V*s/m", 0.0, 1e4),
@@ -38,7 +41,7 @@ LAW: tuple[ParameterSpec, ...] = (
     _live("k1", 3.0, "rise of the nonlinear gain up to large errors", "1", 0.0, 100.0),
     _live("k2", 50.0, "how fast it rises with the error", "1/m", 0.0, 1e5),
     _live("derivative_time", 2e-3, "time constant of the filter on the derivative", "s", 0.0, 1.0),
-    ParameterSpec("antiwindup", "conditional_integration", f"of the integral: {', '.join(ANTIWINDUP)}", live=True),
+    _choice("antiwindup", "conditional_integration", ANTIWINDUP, f"of the integral: {', '.join(ANTIWINDUP)}"),
     _live("tracking_time", 0.1, "time constant of back-calculation", "s", 1e-3, 100.0),
     _live("integral_zone", 1e-3, "error at which integration is down to a half; 0: never", "m", 0.0, 100.0),
     _live("integral_limit", 2.0, "largest contribution of the integral", "V", 0.0, DRIVE_LIMIT_V),
@@ -69,27 +72,22 @@ def default_values() -> dict[str, Any]:
 def check(name: str, value: Any) -> Any:
     """`value` of the parameter of that name, in its type.
 
-    :raises ControlError: unknown name, wrong type, not finite, out of range, none of the choices.
+    :raises HydraulicError: unknown name, or a value that the parameter cannot have.
     """
     if name not in SPECS:
         raise ControlError(f"{name!r} is no parameter of the controller; there are {', '.join(SPECS)}")
-    try:
-        checked = SPECS[name].check(value)
-    except ValueError as error:
-        raise ControlError(str(error)) from None
-    if name in CHOICES and checked not in CHOICES[name]:
-        raise ControlError(f"{name} is {checked!r}; allowed are {', '.join(CHOICES[name])}")
-    return checked
+    return SPECS[name].check(value)
 
 
 def complete(values: Mapping[str, Any]) -> dict[str, Any]:
-    """All parameters: `values` where given, else defaults. Raises `ControlError` as `check` does."""
+    """All parameters: `values` where given, else defaults. Raises as `check` does."""
     return default_values() | {name: check(name, value) for name, value in values.items()}
 
 
 def as_number(name: str, value: Any) -> float:
     """A parameter as the compiled step reads it: choices by their place in the list."""
-    return float(CHOICES[name].index(value)) if name in CHOICES else float(value)
+    choices = SPECS[name].choices
+    return float(choices.index(value)) if choices else float(value)
 
 
 RECORD = np.dtype(

@@ -10,7 +10,7 @@ import numpy as np
 
 from hydraulic_control.errors import ControlError
 from hydraulic_control.response import Response
-from hydraulic_control.trajectories import Limits, Trajectory, approach, make
+from hydraulic_control.trajectories import MotionLimits, Trajectory, approach, make
 from hydraulic_interfaces.samples import PlantSample, Reference
 
 _LONGEST = 4_000_000  # samples kept
@@ -22,7 +22,7 @@ class ReferenceRun:
     Raises `ControlError` for a trajectory that is not possible within the limits.
     """
 
-    def __init__(self, kind: str, settings: Mapping[str, Any], limits: Limits) -> None:
+    def __init__(self, kind: str, settings: Mapping[str, Any], limits: MotionLimits) -> None:
         self.kind, self._limits = kind, limits
         self._own: Trajectory = make(kind, settings, limits)
         self._whole: Trajectory | None = None

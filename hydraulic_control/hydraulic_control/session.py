@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Mapping
 from enum import Enum
-from typing import Any
 
 from hydraulic_control.controller import Controller
 from hydraulic_interfaces.samples import PlantSample, Reference
 
 
-class Fault(Enum):
+class Refusal(Enum):
     """What a state or a reference was refused for."""
 
     NOT_FINITE = "state: position or velocity is not a number"
@@ -50,7 +48,7 @@ class ControlSession:
         self.age_limit, self.reference_timeout = 0.02, 0.1
         self.travel, self.speed_limit = 0.7, 20.0
         self.applied_tolerance = 0.5
-        self.faults: Counter[Fault] = Counter()
+        self.refusals: Counter[Refusal] = Counter()
         self.trouble = ""
         self.answered = 0
         self.reference: Reference | None = None
@@ -68,21 +66,17 @@ class ControlSession:
         self.trouble = ""
         self._commands.clear()
 
-    def set(self, values: Mapping[str, Any]) -> None:
-        """Change parameters of the controller, without a bump."""
-        self.controller.set(values)
-
     def follow(self, reference: Reference) -> bool:
         """Take a reference; False, and a count, for one that is not acceptable or older than the one there is."""
         if not (math.isfinite(reference.position) and abs(reference.position) <= self.travel):
-            self._fault(Fault.BAD_REFERENCE, f"{reference.position:g} m, allowed are ±{self.travel:g} m")
+            self._refuse(Refusal.BAD_REFERENCE, f"{reference.position:g} m, allowed are ±{self.travel:g} m")
             return False
         if math.isinf(reference.velocity):
-            self._fault(Fault.BAD_REFERENCE, f"velocity {reference.velocity:g} m/s")
+            self._refuse(Refusal.BAD_REFERENCE, f"velocity {reference.velocity:g} m/s")
             return False
         # A source that starts anew with another clock must be heard: only a little backwards is out of order.
         if self.reference is not None and 0 < self.reference.stamp_ns - reference.stamp_ns < _BACKWARDS_NS:
-            self._fault(Fault.LATE_REFERENCE, "")
+            self._refuse(Refusal.LATE_REFERENCE, "")
             return False
         self.reference = reference
         return True
@@ -92,15 +86,15 @@ class ControlSession:
         stamp, position = sample.stamp_ns, sample.position
         last = self._stamp_ns
         if last is not None and stamp <= last and last - stamp < _BACKWARDS_NS:
-            self._fault(Fault.OUT_OF_ORDER, "")
+            self._refuse(Refusal.OUT_OF_ORDER, "")
             return None
         age = (now_ns - stamp) * 1e-9
         if age > self.age_limit:
             self._stamp_ns = stamp
-            return self._rest(Fault.STALE, f"{age:.3f} s, allowed are {self.age_limit:g} s")
+            return self._rest(Refusal.STALE, f"{age:.3f} s, allowed are {self.age_limit:g} s")
         if not math.isfinite(position) or math.isinf(sample.velocity):
             self._stamp_ns = stamp
-            return self._rest(Fault.NOT_FINITE, "")
+            return self._rest(Refusal.NOT_FINITE, "")
         dt = 0.0 if last is None else (stamp - last) * 1e-9
         self._stamp_ns = stamp
         leapt = abs(position - self._position) > self.speed_limit * dt
@@ -109,9 +103,9 @@ class ControlSession:
             # The first state, or one after a gap: nothing to differentiate yet.
             return self._start(sample)
         if leapt:
-            return self._rest(Fault.IMPLAUSIBLE, f"to {position:g} m within {dt:g} s")
+            return self._rest(Refusal.IMPLAUSIBLE, f"to {position:g} m within {dt:g} s")
         if not self._obeyed(sample.drive):
-            self._fault(Fault.NOT_OBEYED, f"it applies {sample.drive:g} V")
+            self._refuse(Refusal.NOT_OBEYED, f"it applies {sample.drive:g} V")
             self._start(sample)
         goal, velocity = self._goal(stamp)
         self.error = goal - position
@@ -124,7 +118,7 @@ class ControlSession:
         """To be called while no state comes, ``age`` [s] after the last: True, and a count, once when it is too old."""
         if age <= self.age_limit or self._stamp_ns is None or not self.controller.running:
             return False
-        self._rest(Fault.SILENT, f"{age:.3f} s, allowed are {self.age_limit:g} s")
+        self._rest(Refusal.SILENT, f"{age:.3f} s, allowed are {self.age_limit:g} s")
         return True
 
     def _goal(self, stamp_ns: int) -> tuple[float, float]:
@@ -148,11 +142,11 @@ class ControlSession:
             return True
         return min(commands) - tolerance <= applied <= max(commands) + tolerance
 
-    def _rest(self, fault: Fault, detail: str) -> float:
-        self._fault(fault, detail)
+    def _rest(self, refusal: Refusal, detail: str) -> float:
+        self._refuse(refusal, detail)
         self.controller.stop()
         return 0.0
 
-    def _fault(self, fault: Fault, detail: str) -> None:
-        self.faults[fault] += 1
-        self.trouble = f"{fault.value}: {detail}" if detail else fault.value
+    def _refuse(self, refusal: Refusal, detail: str) -> None:
+        self.refusals[refusal] += 1
+        self.trouble = f"{refusal.value}: {detail}" if detail else refusal.value

@@ -19,7 +19,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 
 PERIOD_S = 1e-3
-Reference = Callable[[float], tuple[float, float]]
+ReferenceCurve = Callable[[float], tuple[float, float]]
 """Position [m] and velocity [m/s] at a time [s]."""
 
 
@@ -79,7 +79,7 @@ class SimulatedPlant:
 
 
 def run(
-    plant: LoopPlant, controller: Controller, reference: Reference, duration: float, dt: float = PERIOD_S
+    plant: LoopPlant, controller: Controller, reference: ReferenceCurve, duration: float, dt: float = PERIOD_S
 ) -> Response:
     """Play ``reference`` for ``duration`` [s]; the controller is stopped first and begins with the first sample.
 
@@ -94,6 +94,6 @@ def run(
     return Response(time, wanted[:, 0].copy(), out[:, 0].copy(), out[:, 1].copy())
 
 
-def step_reference(amplitude: float, start: float = 0.0, at: float = 0.1) -> Reference:
+def step_reference(amplitude: float, start: float = 0.0, at: float = 0.1) -> ReferenceCurve:
     """A step of ``amplitude`` [m] from ``start`` [m] at the time ``at`` [s]."""
     return lambda t: (start + amplitude if t >= at else start, 0.0)

@@ -25,7 +25,7 @@ _FORCE_START = 1e-5  # V/N
 
 
 @dataclass(frozen=True)
-class Found:
+class CriticalResult:
     """A critical point and where it is from; None where the model has none."""
 
     source: str
@@ -39,27 +39,27 @@ def critical_points(
     noise: SensorNoise,
     relay: RelaySettings | None,
     measured: CriticalPoint | None,
-) -> list[Found]:
+) -> list[CriticalResult]:
     """Critical points of the linearised plant, the identified models, and a relay experiment (``measured`` on a bench,
     or run here on the plant where ``relay`` is given)."""
-    found = [Found("linearised at rest", critical_of_model(model), "dry friction left out")]
+    found = [CriticalResult("linearised at rest", critical_of_model(model), "dry friction left out")]
     for one in models:
         point = critical_of_identified(one)
         remark = "" if point else f"no crossing below its Nyquist frequency, {one.highest:.0f} rad/s"
-        found.append(Found(f"identified {one.name}", point, remark))
+        found.append(CriticalResult(f"identified {one.name}", point, remark))
     if measured is not None:
-        found.append(Found("relay on the bench", measured))
+        found.append(CriticalResult("relay on the bench", measured))
     elif relay is not None:
         point, remark = None, f"±{relay.amplitude:g} V"
         try:
             point = measure(SimulatedPlant(model, noise), relay)
         except ControlError as error:
             remark = str(error)
-        found.append(Found("relay on the plant", point, remark))
+        found.append(CriticalResult("relay on the plant", point, remark))
     return found
 
 
-def by_rule(found: Sequence[Found], velocity_gain: float, lag: float) -> dict[str, rules.Gains]:
+def by_rule(found: Sequence[CriticalResult], velocity_gain: float, lag: float) -> dict[str, rules.Gains]:
     """Gains by every rule from every critical point, and by pole placement, named for the tables."""
     made = {
         f"{rule} · {one.source}": function(one.point)

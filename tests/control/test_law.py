@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from hydraulic_control import pole_placement
 from hydraulic_control.controller import Controller
-from hydraulic_control.errors import ControlError
 from hydraulic_control.kernel import nonlinear_gain
 from hydraulic_control.parameters import CONTROLLERS, LAW
+from hydraulic_interfaces.errors import HydraulicError
 
 DT = 1e-3
 PLAIN = {"bumpless_time": 1e-3, "slew_limit": 1e6, "integral_zone": 0.0, "integral_limit": 10.0}
@@ -160,7 +160,7 @@ def test_what_is_refused_names_the_value_and_changes_nothing() -> None:
         ({"antiwindup": "some"}, "conditional_integration"),
         ({"kp": 5.0, "pole_placement.period": 0.5}, "Nyquist"),
     ):
-        with pytest.raises(ControlError, match=complaint):
+        with pytest.raises(HydraulicError, match=complaint):
             law.set(values)
     assert law.values["kp"] == Controller().values["kp"]
     assert settled(law, 0.01) == settled(Controller(), 0.01)

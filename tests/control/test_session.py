@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hydraulic_control.controller import Controller
 from hydraulic_control.parameters import CONTROLLERS
-from hydraulic_control.session import ControlSession, Fault
+from hydraulic_control.session import ControlSession, Refusal
 from hydraulic_interfaces.samples import PlantSample, Reference
 
 MS = 1_000_000
@@ -56,19 +56,19 @@ def test_it_follows_a_reference_and_goes_on_when_it_falls_silent() -> None:
 
 
 @pytest.mark.parametrize(
-    ("reference", "fault"),
+    ("reference", "refusal"),
     [
-        (Reference(START, math.nan), Fault.BAD_REFERENCE),
-        (Reference(START, 5.0), Fault.BAD_REFERENCE),
-        (Reference(START, 0.1, math.inf), Fault.BAD_REFERENCE),
-        (Reference(START - MS, 0.1, 0.0), Fault.LATE_REFERENCE),
+        (Reference(START, math.nan), Refusal.BAD_REFERENCE),
+        (Reference(START, 5.0), Refusal.BAD_REFERENCE),
+        (Reference(START, 0.1, math.inf), Refusal.BAD_REFERENCE),
+        (Reference(START - MS, 0.1, 0.0), Refusal.LATE_REFERENCE),
     ],
 )
-def test_bad_references_are_not_followed(reference: Reference, fault: Fault) -> None:
+def test_bad_references_are_not_followed(reference: Reference, refusal: Refusal) -> None:
     loop = session()
     assert loop.follow(Reference(START, 0.02, 0.0))
     assert not loop.follow(reference)
-    assert loop.faults[fault] == 1
+    assert loop.refusals[refusal] == 1
     assert loop.reference is not None and loop.reference.position == 0.02
 
 
@@ -78,7 +78,7 @@ def test_a_stale_state_gives_0_V_and_says_so() -> None:
     loop.follow(Reference(START, 0.02))
     assert feed(loop, 200, first=10)[-1] == pytest.approx(2.0, rel=0.02)
     assert feed(loop, 1, first=210, age=0.05) == [0.0]
-    assert loop.faults[Fault.STALE] == 1 and "0.050 s" in loop.trouble
+    assert loop.refusals[Refusal.STALE] == 1 and "0.050 s" in loop.trouble
     again = feed(loop, 600, first=211)
     assert again[0] == pytest.approx(0.0, abs=1e-6), "it joins on without a bump"
     assert again[-1] == pytest.approx(2.0, rel=0.05)
@@ -89,24 +89,24 @@ def test_silence_is_noticed_once() -> None:
     feed(loop, 10)
     assert not loop.silence(0.01)
     assert loop.silence(0.03) and not loop.silence(0.04)
-    assert loop.faults[Fault.SILENT] == 1
+    assert loop.refusals[Refusal.SILENT] == 1
 
 
 @pytest.mark.parametrize(
-    ("sample", "answer", "fault"),
+    ("sample", "answer", "refusal"),
     [
-        (PlantSample(START + 10 * MS, math.nan), 0.0, Fault.NOT_FINITE),
-        (PlantSample(START + 10 * MS, math.inf), 0.0, Fault.NOT_FINITE),
-        (PlantSample(START + 10 * MS, 0.5, 0.0), 0.0, Fault.IMPLAUSIBLE),
-        (PlantSample(START + 9 * MS, 0.0), None, Fault.OUT_OF_ORDER),
-        (PlantSample(START + 5 * MS, 0.0), None, Fault.OUT_OF_ORDER),
+        (PlantSample(START + 10 * MS, math.nan), 0.0, Refusal.NOT_FINITE),
+        (PlantSample(START + 10 * MS, math.inf), 0.0, Refusal.NOT_FINITE),
+        (PlantSample(START + 10 * MS, 0.5, 0.0), 0.0, Refusal.IMPLAUSIBLE),
+        (PlantSample(START + 9 * MS, 0.0), None, Refusal.OUT_OF_ORDER),
+        (PlantSample(START + 5 * MS, 0.0), None, Refusal.OUT_OF_ORDER),
     ],
 )
-def test_what_cannot_be_believed(sample: PlantSample, answer: float | None, fault: Fault) -> None:
+def test_what_cannot_be_believed(sample: PlantSample, answer: float | None, refusal: Refusal) -> None:
     loop = session()
     feed(loop, 10)
     assert loop.answer(sample, START + 10 * MS) == answer
-    assert loop.faults[fault] == 1
+    assert loop.refusals[refusal] == 1
 
 
 def test_a_leap_that_the_next_state_confirms_is_believed() -> None:
@@ -123,7 +123,7 @@ def test_nothing_winds_up_while_the_plant_does_not_obey() -> None:
     loop.follow(Reference(START, 0.05))
     answers = feed(loop, 5000, first=10, drive=0.0)
     assert max(abs(a) for a in answers[50:] if a is not None) < 3.0, "5 V proportional and more integral do not pile up"
-    assert loop.faults[Fault.NOT_OBEYED] > 0
+    assert loop.refusals[Refusal.NOT_OBEYED] > 0
 
 
 wild = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.floats(-0.5, 0.5))

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hydraulic_control.errors import ControlError
-from hydraulic_control.trajectories import KINDS, Limits, approach, make
+from hydraulic_control.trajectories import KINDS, MotionLimits, approach, make
 
 SETTINGS = {"offset": 0.01, "amplitude": 0.05, "frequency": 0.5, "cycles": 3, "levels": 4, "dwell": 1.0, "file": ""}
 SMOOTH = sorted(set(KINDS) - {"step", "staircase", "playback"})
@@ -32,7 +32,7 @@ def sampled(trajectory, before: float = 0.01):  # type: ignore[no-untyped-def]
 def test_what_is_not_refused_is_smooth_and_within_the_limits(
     kind: str, amplitude: float, frequency: float, velocity: float, acceleration: float
 ) -> None:
-    limits = Limits(0.5, velocity, acceleration)
+    limits = MotionLimits(0.5, velocity, acceleration)
     try:
         trajectory = make(kind, {**SETTINGS, "amplitude": amplitude, "frequency": frequency}, limits)
     except ControlError:
@@ -48,7 +48,7 @@ def test_what_is_not_refused_is_smooth_and_within_the_limits(
 
 
 def test_the_shapes() -> None:
-    limits = Limits(1.0, 0.4, 10.0)
+    limits = MotionLimits(1.0, 0.4, 10.0)
     for kind, low, high in (
         ("step", 0.01, 0.06), ("staircase", 0.01, 0.06), ("sine", -0.04, 0.06), ("triangle", -0.04, 0.06),
         ("trapezoid", 0.01, 0.06), ("minimum_jerk", 0.01, 0.06),
@@ -78,13 +78,13 @@ def test_the_shapes() -> None:
 )
 def test_what_leaves_the_limits_is_refused(kind: str, changed: dict[str, float], complaint: str) -> None:
     with pytest.raises(ControlError, match=complaint):
-        make(kind, {**SETTINGS, **changed}, Limits(0.5, 0.3, 5.0))
+        make(kind, {**SETTINGS, **changed}, MotionLimits(0.5, 0.3, 5.0))
 
 
 def test_playback(tmp_path: Path) -> None:
     file = tmp_path / "path.csv"
     file.write_text("time_s, position_m\n2.0, 0.00\n3.0, 0.05\n4.0, 0.02\n")
-    trajectory = make("playback", {**SETTINGS, "file": str(file)}, Limits(0.5, 0.4, 10.0))
+    trajectory = make("playback", {**SETTINGS, "file": str(file)}, MotionLimits(0.5, 0.4, 10.0))
     assert trajectory.duration == 2.0
     assert [trajectory.at(t)[0] for t in (-1.0, 0.0, 1.0, 2.0, 9.0)] == pytest.approx([0.0, 0.0, 0.05, 0.02, 0.02])
     _, x, v = sampled(trajectory)
@@ -94,11 +94,11 @@ def test_playback(tmp_path: Path) -> None:
     for text in (head + "0,0\n", "t,x\n0,0\n1,1\n", head + "1,0\n0,1\n", head + "0,a\n1,0\n"):
         file.write_text(text)
         with pytest.raises(ControlError, match="needs"):
-            make("playback", {**SETTINGS, "file": str(file)}, Limits())
+            make("playback", {**SETTINGS, "file": str(file)}, MotionLimits())
 
 
 def test_the_approach_begins_where_the_piston_is() -> None:
-    limits = Limits(0.5, 0.2, 2.0)
+    limits = MotionLimits(0.5, 0.2, 2.0)
     whole = approach(-0.3, make("step", SETTINGS, limits), limits)
     _, x, v = sampled(whole)
     assert x[0] == -0.3

@@ -26,8 +26,8 @@ class ControllerHealth:
     def message(self, state: str, now_ns: int) -> DiagnosticArray:
         """The row at `now_ns`; `state` is the lifecycle state."""
         session = self._session
-        faults = sum(session.faults.values())
-        more, self._seen = faults - self._seen, faults
+        refused = sum(session.refusals.values())
+        more, self._seen = refused - self._seen, refused
         elapsed = max((now_ns - self._then_ns) * 1e-9, 1e-9)
         rate, self._then_ns = (session.answered - self._answered) / elapsed, now_ns
         self._answered = session.answered
@@ -42,7 +42,7 @@ class ControllerHealth:
             "rate_Hz": f"{rate:.1f}",
             "scheduling": self.scheduling,
             "last_trouble": session.trouble,
-            **{fault.name.lower(): count for fault, count in session.faults.items()},
+            **{refusal.name.lower(): count for refusal, count in session.refusals.items()},
         }
         if late:
             values["latency_p50_ms"] = f"{late[len(late) // 2] * 1e3:.4f}"

@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hydraulic_control import gains_file
-from hydraulic_control.parameters import LAW, SPECS, check
+from hydraulic_control.parameters import LAW, SPECS
 from hydraulic_control.session import ControlSession
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.parameter_spec import ParameterSpec
@@ -41,7 +41,7 @@ class ControllerParameters:
         self.table = ParameterTable(node, PARAMETERS, self._apply, locked)
         for spec in SAFETY:
             self._apply(spec.name, self.table[spec.name])
-        session.set({spec.name: self.table[spec.name] for spec in LAW})
+        session.controller.set({spec.name: self.table[spec.name] for spec in LAW})
 
     def load_gains(self) -> None:
         """Take the gains of the file that is named, once, where the start of the node did not say otherwise.
@@ -53,7 +53,7 @@ class ControllerParameters:
             return
         given = self._node._parameter_overrides
         values = {name: value for name, value in gains_file.load(gains).items() if name not in given}
-        self._session.set(values)  # all at once: one by one they need not go together
+        self._session.controller.set(values)  # all at once: one by one they need not go together
         for result in self._node.set_parameters([Parameter(name, value=value) for name, value in values.items()]):
             if not result.successful:
                 raise ValueError(result.reason)
@@ -61,6 +61,6 @@ class ControllerParameters:
 
     def _apply(self, name: str, value: Any) -> None:
         if name in SPECS:
-            self._session.set({name: check(name, value)})
+            self._session.controller.set({name: value})
         else:
             setattr(self._session, name, value)

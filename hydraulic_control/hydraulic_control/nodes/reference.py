@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 from hydraulic_control.errors import ControlError
 from hydraulic_control.nodes._reference_parameters import PARAMETERS
 from hydraulic_control.reference_run import ReferenceRun
-from hydraulic_control.trajectories import Limits
+from hydraulic_control.trajectories import MotionLimits
 from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE, absolute
 from hydraulic_interfaces.conversions import ReferenceEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
@@ -71,7 +71,7 @@ class ReferenceNode(ServedNode):
 
     def _make(self) -> ReferenceRun:
         v = self._table
-        limits = Limits(v["travel_limit"], v["velocity_limit"], v["acceleration_limit"])
+        limits = MotionLimits(v["travel_limit"], v["velocity_limit"], v["acceleration_limit"])
         return ReferenceRun(v["kind"], v.values(), limits)
 
     def _on_state(self, message: JointState) -> None:

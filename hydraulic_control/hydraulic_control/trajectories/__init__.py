@@ -10,7 +10,7 @@ from typing import Any
 
 from hydraulic_control.errors import ControlError
 
-from ._base import Limits, Trajectory, check
+from ._base import MotionLimits, Trajectory, check_limits
 from .minimum_jerk import MinimumJerk
 from .playback import Playback
 from .sequence import Rest, Sequence, approach
@@ -31,7 +31,7 @@ KINDS: dict[str, Any] = {
 }
 
 
-def make(kind: str, settings: Mapping[str, Any], limits: Limits) -> Trajectory:
+def make(kind: str, settings: Mapping[str, Any], limits: MotionLimits) -> Trajectory:
     """The trajectory of that kind, within the limits.
 
     ``settings``: offset [m], amplitude [m], frequency [Hz], cycles, levels, dwell [s], file. Raises
@@ -40,8 +40,8 @@ def make(kind: str, settings: Mapping[str, Any], limits: Limits) -> Trajectory:
     if kind not in KINDS:
         raise ControlError(f"reference kind is {kind!r}; allowed are {', '.join(KINDS)}")
     trajectory: Trajectory = KINDS[kind].from_settings(settings, limits)
-    check(kind, trajectory, limits)
+    check_limits(kind, trajectory, limits)
     return trajectory
 
 
-__all__ = ["KINDS", "Limits", "Rest", "Sequence", "Trajectory", "approach", "check", "make"]
+__all__ = ["KINDS", "MotionLimits", "Rest", "Sequence", "Trajectory", "approach", "make"]

@@ -16,7 +16,7 @@ _TOLERANCE = 1.001
 
 
 @dataclass(frozen=True)
-class Limits:
+class MotionLimits:
     """Largest position to either side of mid-stroke [m], velocity [m/s] and acceleration [m/s²] of a reference."""
 
     travel: float = 0.6
@@ -48,13 +48,13 @@ class Profile:
     jumps: ClassVar[bool] = False
 
     @classmethod
-    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Trajectory:
+    def from_settings(cls, settings: Mapping[str, Any], limits: MotionLimits) -> Trajectory:
         """See `make`; a field that is no setting is a limit."""
         known = {**vars(limits), **settings}
         return cls(**{f.name: known[f.name] for f in fields(cls)})  # type: ignore[return-value]
 
 
-def check(name: str, trajectory: Trajectory, limits: Limits) -> None:
+def check_limits(name: str, trajectory: Trajectory, limits: MotionLimits) -> None:
     """Raise `ControlError` where the trajectory leaves the limits: what, how far, what is allowed.
 
     A step and a staircase jump: of them only the travel is checked, the actuator goes as fast as it can.

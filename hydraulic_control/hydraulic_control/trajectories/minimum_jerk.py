@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ._base import Limits, Profile
+from ._base import MotionLimits, Profile
 
 PEAK_VELOCITY = 15.0 / 8.0
 PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
@@ -23,7 +23,7 @@ def blend(tau: float) -> tuple[float, float]:
     return tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 30.0 * tau**2 * (1.0 - tau) ** 2
 
 
-def shortest_time(distance: float, limits: Limits) -> float:
+def shortest_time(distance: float, limits: MotionLimits) -> float:
     """Least time [s] for ``distance`` [m] within the limits of velocity and acceleration."""
     way = abs(distance)
     return max(PEAK_VELOCITY * way / limits.velocity, math.sqrt(PEAK_ACCELERATION * way / limits.acceleration))
@@ -38,7 +38,7 @@ class MinimumJerk(Profile):
     back: bool = True
 
     @classmethod
-    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> MinimumJerk:
+    def from_settings(cls, settings: Mapping[str, Any], limits: MotionLimits) -> MinimumJerk:
         """See `make`; half a period of ``frequency`` [Hz] per way, or longer where the limits ask for it."""
         half = max(0.5 / settings["frequency"], shortest_time(settings["amplitude"], limits))
         return cls(settings["offset"], settings["amplitude"], half, settings["dwell"])

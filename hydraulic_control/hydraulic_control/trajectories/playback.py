@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from hydraulic_control.errors import ControlError
 
-from ._base import Limits
+from ._base import MotionLimits
 
 COLUMNS = ("time_s", "position_m")
 
@@ -31,7 +31,7 @@ class Playback:
         self._duration = float(time[-1] - time[0])
 
     @classmethod
-    def from_settings(cls, settings: Mapping[str, Any], limits: Limits) -> Playback:
+    def from_settings(cls, settings: Mapping[str, Any], limits: MotionLimits) -> Playback:
         """See `make`; reads the CSV file with the columns time_s and position_m."""
         return cls(*read_points(Path(settings["file"])))
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence as Several
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ._base import Limits, Trajectory
+from ._base import MotionLimits, Trajectory
 from .minimum_jerk import MinimumJerk, shortest_time
 
 _SETTLE_S = 0.5
@@ -50,7 +50,7 @@ class Sequence:
         return self._parts[-1].at(t)
 
 
-def approach(position: float, trajectory: Trajectory, limits: Limits) -> Sequence:
+def approach(position: float, trajectory: Trajectory, limits: MotionLimits) -> Sequence:
     """From ``position`` [m] smoothly to where the trajectory begins, half a second of rest, and the trajectory."""
     start = trajectory.at(0.0)[0]
     way = MinimumJerk(position, start - position, shortest_time(start - position, limits), back=False)

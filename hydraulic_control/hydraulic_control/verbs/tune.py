@@ -107,7 +107,7 @@ def _remarks(options: argparse.Namespace, tuned: Tuned) -> str:
     )
 
 
-def _show_points(out: Console, found: list[tune_run.Found]) -> None:
+def _show_points(out: Console, found: list[tune_run.CriticalResult]) -> None:
     rows = []
     for one in found:
         cells = ("–", "–") if one.point is None else (f"{one.point.gain:.4g}", f"{1e3 * one.point.period:.4g}")
@@ -133,7 +133,7 @@ def _show_tuned(out: Console, options: argparse.Namespace, model: Any, tuned: Tu
     out.print(table)
 
 
-def _document(found: list[tune_run.Found], gains: dict[str, Any], tuned: Tuned) -> dict[str, Any]:
+def _document(found: list[tune_run.CriticalResult], gains: dict[str, Any], tuned: Tuned) -> dict[str, Any]:
     return {
         "critical_points": [
             {"source": one.source, "remark": one.remark, **(one.point.as_document() if one.point else {})}
