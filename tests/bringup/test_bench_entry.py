@@ -42,12 +42,12 @@ case "$*" in
     done ;;
 *"-m ruff"*) [ ! -e "$BREAK" ] || { echo "E501 line too long"; exit 1; } ;;
 *"-m mypy"*) echo "Success: no issues found" ;;
-*"-m pytest tests/$SEEPS"*"--last-failed"*) echo "=== 3 passed, 7 deselected in 0.02s ===" ;;
-*"-m pytest tests/$LEAKS"*|*"-m pytest tests/$SEEPS"*)
+*"-m $SEEPS "*"--last-failed"*) echo "=== 3 passed, 7 deselected in 0.02s ===" ;;
+*"-m $LEAKS "*|*"-m $SEEPS "*)
     echo "test_seal.py F"
     echo "=== 1 failed, 1 passed, 2 errors in 0.02s ==="
     exit 1 ;;
-*"-m pytest tests/$BURSTS"*) echo "Segmentation fault"; exit 139 ;;
+*"-m $BURSTS "*) echo "Segmentation fault"; exit 139 ;;
 *"-m pytest"*) echo "collected 2 items"; echo "=== 2 passed, 1 warning in 0.01s ===" ;;
 esac
 """
@@ -367,16 +367,25 @@ def test_failed_build_says_which_why_and_what_to_do_and_is_tried_again(checkout:
 # --- test ---------------------------------------------------------------------------------------------------------
 
 
-def test_test_runs_ruff_mypy_and_pytest(built: FakeCheckout) -> None:
+def test_all_tests_run_those_of_the_wall_clock_last_and_the_closing_line_sums_up(built: FakeCheckout) -> None:
     answer = built.bench("test")
-    assert answer.returncode == 0
-    assert [call.split()[1] for call in built.calls()] == ["ruff", "mypy", "pytest"]
-    assert answer.stdout.splitlines()[-1] == "=== 2 passed, 1 warning in 0.01s ==="
+    assert answer.returncode == 0, answer.stderr
+    calls = [re.sub(r"-o cache_dir=\S+ | -n \d+", "", call) for call in built.calls()]
+    assert calls == [
+        "-m ruff check .",
+        "-m mypy",
+        "-m pytest -m not timing -p xdist --dist=loadfile --no-loadscope-reorder tests",
+        "-m pytest -m timing tests",
+    ]
+    assert answer.stdout.count("collected 2 items") == 2
+    assert answer.stdout.splitlines()[-1].startswith("=== 4 passed, 2 warnings in ")
 
 
 def test_test_with_arguments_runs_only_pytest(built: FakeCheckout) -> None:
-    assert built.bench("test", "-k", "plant").returncode == 0
+    answer = built.bench("test", "-k", "plant")
+    assert answer.returncode == 0
     assert built.calls() == ["-m pytest -k plant"]
+    assert answer.stdout.splitlines()[-1] == "=== 2 passed, 1 warning in 0.01s ==="
 
 
 def test_failed_check_fails_the_test_and_the_closing_line_stays_last(built: FakeCheckout) -> None:
@@ -384,63 +393,31 @@ def test_failed_check_fails_the_test_and_the_closing_line_stays_last(built: Fake
     answer = built.bench("test")
     assert answer.returncode == 1
     assert "ruff" in answer.stdout.splitlines()[-2]
-    assert answer.stdout.splitlines()[-1] == "=== 2 passed, 1 warning in 0.01s ==="
+    assert answer.stdout.splitlines()[-1].startswith("=== 4 passed")
 
 
-@pytest.fixture
-def with_tests(built: FakeCheckout) -> FakeCheckout:
-    """A checkout with tests that compute, tests that keep time, and one that needs the machine for itself."""
-    for name in ("sim/test_law.py", "sim/test_pump_node.py", "system/test_vcan.py", "system/test_demo.py"):
-        (built.root / "tests" / name).parent.mkdir(parents=True, exist_ok=True)
-        (built.root / "tests" / name).touch()
-    for name in ("sysid/test_fit.py", "hidden_effects/test_leak.py", "pump/test_pump.py"):
-        (built.root / "tests" / name).parent.mkdir(parents=True, exist_ok=True)
-        (built.root / "tests" / name).touch()
-    return built
-
-
-def test_all_tests_run_once_and_the_closing_line_sums_up(with_tests: FakeCheckout) -> None:
-    answer = with_tests.bench("test")
-    assert answer.returncode == 0, answer.stderr
-    calls = [call for call in with_tests.calls() if "pytest" in call]
-    assert sorted(call.partition(" -o cache_dir=")[0] for call in calls) == [
-        "-m pytest tests/hidden_effects --ignore-glob=*_node.py -p no:cacheprovider",
-        "-m pytest tests/pump tests/sim/test_pump_node.py",
-        "-m pytest tests/sim tests/sysid --ignore-glob=*_node.py -p no:cacheprovider",
-        "-m pytest tests/system --ignore=tests/system/test_vcan.py",
-        "-m pytest tests/system/test_vcan.py",
-    ]
-    assert answer.stdout.count("collected 2 items") == 5
-    assert answer.stdout.splitlines()[-1].startswith("=== 10 passed, 5 warnings in ")
-
-
-KEEP_TIME = ["system/test_vcan.py", "system --ignore", "pump"]
-
-
-@pytest.mark.parametrize("folder", KEEP_TIME)
-def test_what_keeps_time_and_fails_is_run_again_alone(with_tests: FakeCheckout, folder: str) -> None:
-    answer = with_tests.bench("test", SEEPS=folder)
-    calls = [call for call in with_tests.calls() if f"pytest tests/{folder}" in call]
-    assert [" --last-failed" in call for call in calls] == [False, True]
-    assert calls[1] == f"{calls[0]} --last-failed", "it knows from the first what failed"
+def test_only_tests_of_the_wall_clock_are_repeated(built: FakeCheckout) -> None:
+    answer = built.bench("test", SEEPS="timing")
+    timing = [call for call in built.calls() if "-m timing" in call]
+    assert timing[1:] == [f"{timing[0]} --last-failed"], "it knows from the first what failed"
     assert answer.returncode == 0
     assert "test_seal.py F" in answer.stdout
-    assert answer.stdout.splitlines()[-1].startswith("=== 12 passed, 7 deselected, 3 repeated, 4 warnings in ")
+    assert answer.stdout.splitlines()[-1].startswith("=== 6 passed, 3 repeated, 1 warnings in ")
 
 
-@pytest.mark.parametrize("folder", [*KEEP_TIME, "hidden_effects"])
-def test_whichever_run_fails_fails_the_test(with_tests: FakeCheckout, folder: str) -> None:
-    leaks = with_tests.bench("test", LEAKS=folder)
+@pytest.mark.parametrize("marker", ["not timing", "timing"])
+def test_whichever_run_fails_fails_the_test(built: FakeCheckout, marker: str) -> None:
+    leaks = built.bench("test", LEAKS=marker)
     assert leaks.returncode == 1
     counts = leaks.stdout.splitlines()[-1].partition(" in ")[0]
-    if folder in KEEP_TIME:  # again, and in vain
-        assert counts == "=== 1 failed, 10 passed, 3 repeated, 4 warnings, 2 errors"
-    else:
-        assert counts == "=== 1 failed, 9 passed, 4 warnings, 2 errors"
+    again = ", 3 repeated" if marker == "timing" else ""  # and in vain
+    passed = 4 if marker == "timing" else 3
+    assert counts == f"=== 1 failed, {passed} passed{again}, 1 warnings, 2 errors"
     assert "test_seal.py F" in leaks.stdout
-    bursts = with_tests.bench("test", BURSTS=folder)
+    assert ("--last-failed" in "".join(built.calls())) == (marker == "timing")
+    bursts = built.bench("test", BURSTS=marker)
     assert bursts.returncode == 139
-    assert bursts.stdout.splitlines()[-1].startswith("=== 8 passed, 4 warnings, 1 errors in ")
+    assert bursts.stdout.splitlines()[-1].startswith("=== 2 passed, 1 warnings, 1 errors in ")
     assert "Segmentation fault" in bursts.stdout
 
 
