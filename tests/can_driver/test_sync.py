@@ -119,6 +119,7 @@ def off_phase(nanoseconds: int) -> float:
     return abs((nanoseconds + PERIOD // 2) % PERIOD - PERIOD // 2) / PERIOD
 
 
+@pytest.mark.timing
 def test_in_step_with_the_kernel(
     kernel_bench: Bench, kernel: Kernel, wire: Any, running: tuple[PlantLoop, Ports], wait_until: Any
 ) -> None:
@@ -139,6 +140,7 @@ def test_in_step_with_the_kernel(
     assert wire.sent(0x510)[-1][1] == bytes(4), "0 V at the end"
 
 
+@pytest.mark.timing
 def test_a_missed_sync_concerns_its_own_cycle_only(
     kernel_bench: Bench, kernel: Kernel, running: tuple[PlantLoop, Ports], wait_until: Any
 ) -> None:
@@ -176,6 +178,7 @@ def test_no_kernel_no_frames(kernel_bench: Bench, wire: Any) -> None:
         bench.start()
 
 
+@pytest.mark.timing
 def test_the_loop_sends_the_drive_before_its_sync_and_that_on_its_instant(bench: Bench, wire: Any) -> None:
     bench.boot()
     bench.start()

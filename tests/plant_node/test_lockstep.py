@@ -12,7 +12,7 @@ from plant_node.test_plant_loop import PERIOD, Scripted
 
 from hydraulic_interfaces.samples import Command, PlantSample
 from hydraulic_plant_node import lockstep
-from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.command_gate import CommandGate, Verdict
 from hydraulic_plant_node.plant_loop import LoopTiming, PlantLoop
 
 
@@ -125,6 +125,20 @@ def test_a_slow_answer_stretches_the_run_and_changes_nothing(run: Any) -> None:
     assert ports.clock[:600] == [sample.stamp_ns for sample in ports.samples[:600]]
 
 
+def test_a_source_that_is_late_from_the_start_is_waited_for(run: Any) -> None:
+    """It answers sample after sample, the first of them later than the watchdog allows."""
+    begun = time.monotonic()
+
+    def answer(sample: PlantSample) -> float:
+        time.sleep(max(begun + 0.3 - time.monotonic(), 0.0))
+        return number(sample)
+
+    loop, ports = run(answer, samples(600))
+    check_answers(ports.samples[:600])
+    assert loop._gate.counts[Verdict.STALE] > 0 and loop._gate.timeouts == 0
+
+
+@pytest.mark.timing
 def test_it_goes_as_fast_as_it_is_answered(run: Any) -> None:
     begun = time.monotonic()
     loop, ports = run(number, samples(10_000), factor=100.0)

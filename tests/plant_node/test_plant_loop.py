@@ -138,6 +138,7 @@ def test_a_stall_is_skipped_and_counted_by_a_plant_that_cannot(wait_until: Any) 
     assert all((s - stamps[0]) % PERIOD == 0 for s in stamps)
 
 
+@pytest.mark.timing
 def test_a_cycle_that_begins_too_late_is_left_out(wait_until: Any) -> None:
     """With a share of one half, no step begins more than half a period after its instant."""
     late: list[float] = []
@@ -171,6 +172,7 @@ def test_a_cycle_without_a_sample_is_counted_and_publishes_nothing(wait_until: A
     assert 20 <= loop.lost <= loop.samples / 8
 
 
+@pytest.mark.timing
 def test_a_plant_with_a_beat_of_its_own_says_when_to_begin(wait_until: Any) -> None:
     class Beating(Scripted):
         first = 0

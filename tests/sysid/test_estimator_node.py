@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +13,12 @@ import pytest
 pytest.importorskip("rclpy")
 
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
 
-from hydraulic_interfaces.conversions import from_time, sample_from_messages  # noqa: E402
+from hydraulic_interfaces.contract import topic  # noqa: E402
+from hydraulic_interfaces.conversions import command_to_message, from_time, sample_from_messages  # noqa: E402
+from hydraulic_interfaces.qos import profile  # noqa: E402
+from hydraulic_interfaces.samples import Command  # noqa: E402
 from hydraulic_sysid.linear.models import ArxOrder, read_linear_model  # noqa: E402
 from hydraulic_sysid.linear.online import SlowSampler  # noqa: E402
 
@@ -31,37 +33,39 @@ def stamps(messages: list[Any]) -> list[int]:
 
 
 class Bench:
-    """Plant, estimator and a source that wiggles the drive."""
+    """Plant, estimator and a source that wiggles the drive.
+
+    In lockstep: a command is sent when the estimator has taken the state that it answers, so that a busy machine makes
+    neither of the two lose one.
+    """
 
     def __init__(self, launch: Any, client: Any, wait_until: Any) -> None:
         self.client, self.wait_until = client, wait_until
         self.states = client.collect("state")
         self.heard = {name: client.collect(name) for name in TOPICS}
         self._launch = launch
+        self._command = client.publisher("command")
+        client.node.create_subscription(JointState, topic("residual"), self._answer, profile("residual", 5000))
 
     def start(self, *options: str) -> Any:
-        # A loaded machine may hold a node up for longer than the bench's watchdog allows.
-        plant = ("-p", "enable_on_activate:=true", "-p", f"rate:={RATE}", "-p", "watchdog:=2.0")
-        self._launch("hydraulic_sim.nodes.simulator", "--autostart", "--ros-args", *plant, "-p", "position_noise:=2e-5")
+        plant = ("enable_on_activate:=true", f"rate:={RATE}", "lockstep:=true", "position_noise:=2e-5")
+        settings = [part for setting in plant for part in ("-p", setting)]
+        self._launch("hydraulic_sim.nodes.simulator", "--autostart", "--ros-args", *settings)
         process = self._launch("hydraulic_sysid.nodes.estimator", "--ros-args", *options)
         self.wait_until(lambda: self.heard["residual"], "a residual")
-        self.source = self.client.source("test", 1.0)
         return process
 
-    def wiggle(self, count: int) -> None:
-        """Random drives until that many sets of coefficients have come since."""
-        seen = len(self.heard["model_parameters"])
-        self.wiggle_until(lambda: len(self.heard["model_parameters"]) >= seen + count, f"{count} sets of coefficients")
+    def _answer(self, residual: JointState) -> None:
+        """Random drives, another one every 0.1 s; the residual of a state is told with the next."""
+        stamp_ns = from_time(residual.header.stamp) + round(1e9 / RATE)
+        drive = np.random.default_rng(stamp_ns // 100_000_000).uniform(-2.0, 2.0)
+        self._command.publish(command_to_message(Command(stamp_ns, "test", float(drive))))
 
-    def wiggle_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Random drives until the condition holds."""
-
-        def holds() -> bool:
-            # Another drive every 0.1 s, whatever the pace of this loop.
-            self.source.drive = float(np.random.default_rng(int(time.monotonic() * 10)).uniform(-2.0, 2.0))
-            return condition()
-
-        self.wait_until(holds, what)
+    def coefficients(self, count: int) -> None:
+        """Wait until that many sets of coefficients have come since."""
+        heard = self.heard["model_parameters"]
+        seen = len(heard)
+        self.wait_until(lambda: len(heard) >= seen + count, f"{count} sets of coefficients")
 
     def set_forgetting(self, value: float) -> Any:
         number = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
@@ -81,7 +85,7 @@ def bench(launch: Any, client: Any, wait_until: Any, compiled_physics: None) -> 
 def test_the_topics_carry_what_the_pure_parts_make_of_the_states(bench: Bench, tmp_path: Path) -> None:
     file = tmp_path / "model.json"
     process = bench.start("-p", "sampling_time:=0.02", "-p", "na:=2", "-p", "nb:=2", "-p", f"save_to:={file}")
-    bench.wiggle(100)
+    bench.coefficients(100)
     heard = {name: list(messages) for name, messages in bench.heard.items()}
 
     # The physical model: measured = predicted + residual, at the stamps of the states.
@@ -109,8 +113,8 @@ def test_the_topics_carry_what_the_pure_parts_make_of_the_states(bench: Bench, t
     assert len(poles.effort) == 2 and fit.effort[0] > 70.0
     assert np.median(np.diff(stamps(heard["model_fit"]))) == PERIOD_NS
 
-    # An integrator shows itself, sooner or later by how many samples a busy machine lets through.
-    bench.wiggle_until(lambda: abs(max(bench.heard["model_poles"][-1].position) - 1.0) < 0.02, "an integrator's pole")
+    # An integrator shows itself.
+    bench.wait_until(lambda: abs(max(bench.heard["model_poles"][-1].position) - 1.0) < 0.02, "an integrator's pole")
     answer = bench.client.call("std_srvs/srv/Trigger", f"{NODE}/save")
     assert answer.success, answer.message
     model, content = read_linear_model(file)
@@ -123,7 +127,7 @@ def test_the_topics_carry_what_the_pure_parts_make_of_the_states(bench: Bench, t
 def test_every_prediction_is_that_of_the_coefficients_before_it(bench: Bench) -> None:
     """From the states alone: sampled as a record is, times the coefficients that were published last."""
     bench.start("-p", "sampling_time:=0.02", "-p", "na:=2", "-p", "nb:=2")
-    bench.wiggle(60)
+    bench.coefficients(60)
     coefficients = {from_time(m.header.stamp): np.array(m.position) for m in list(bench.heard["model_parameters"])}
     fits = {from_time(m.header.stamp): m for m in list(bench.heard["model_fit"])}
     grid = min(coefficients)
@@ -146,7 +150,7 @@ def test_every_prediction_is_that_of_the_coefficients_before_it(bench: Bench) ->
 
 def test_it_can_be_told_to_learn_anew_and_to_forget_faster(bench: Bench) -> None:
     bench.start("-p", "sampling_time:=0.02", "-p", "na:=1", "-p", "nb:=1")
-    bench.wiggle(50)
+    bench.coefficients(50)
     sure = bench.heard["model_parameters"][-1].velocity[0]
     assert bench.client.call("std_srvs/srv/Trigger", f"{NODE}/reset_covariance").success
     seen = len(bench.heard["model_parameters"])
@@ -161,11 +165,10 @@ def test_it_can_be_told_to_learn_anew_and_to_forget_faster(bench: Bench) -> None
     rows: list[Any] = bench.client.collect("diagnostics")
 
     def settled() -> bool:
-        # A machine that loses states for a moment makes the estimator begin anew; it goes on learning all the same.
         said = [r for m in rows for r in m.status if r.name == f"{NODE}: estimate" and "ARX(1, 1, 1)" in r.message]
         return bool(said) and int({pair.key: pair.value for pair in said[-1].values}["updates"]) > 50
 
-    bench.wiggle_until(settled, "50 updates in the diagnostics")
+    bench.wait_until(settled, "50 updates in the diagnostics")
 
 
 def test_what_cannot_be_is_refused_at_once(launch: Any) -> None:

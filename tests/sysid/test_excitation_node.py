@@ -90,7 +90,7 @@ def bench(launch: Any, client: Any, wait_until: Any, tmp_path: Path) -> Bench:
 
 
 def test_a_plan_is_played_to_its_end(bench: Bench) -> None:
-    bench.plant()
+    bench.plant("-p", "lockstep:=true")
     plan = short_plan()
     node = bench.excitation(plan)
     assert node.wait() == 0, node.output()

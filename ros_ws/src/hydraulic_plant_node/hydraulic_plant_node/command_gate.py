@@ -63,7 +63,7 @@ class CommandGate:
         self._source = ""
         self._drive = 0.0
         self._heard_ns: int | None = None
-        self._obeyed_ns = (0, 0)
+        self._answered_ns = (0, 0)
         # A new object per change of `enabled`: unlike a count it loses none where two threads change it at once.
         self._change = self._seen_change = object()
 
@@ -84,9 +84,9 @@ class CommandGate:
         return self._source
 
     @property
-    def obeyed_ns(self) -> tuple[int, int]:
-        """Stamps of the last two commands that were obeyed, the newest first."""
-        return self._obeyed_ns
+    def answered_ns(self) -> tuple[int, int]:
+        """Stamps of the last two commands that were obeyed, or would have been had they come sooner; newest first."""
+        return self._answered_ns
 
     @property
     def stopped(self) -> bool:
@@ -131,7 +131,8 @@ class CommandGate:
             self._source = command.source
             self._drive = min(max(command.drive, -self.limit), self.limit)
             self._heard_ns = now_ns
-            self._obeyed_ns = command.stamp_ns, self._obeyed_ns[0]
+        if verdict.obeyed or verdict is Verdict.STALE and self.enabled and self._source in ("", command.source):
+            self._answered_ns = command.stamp_ns, self._answered_ns[0]
         if verdict is not Verdict.ACCEPTED:
             self.last_problem = f"{verdict.value} (source {command.source!r}, {command.drive} V)"
         return verdict

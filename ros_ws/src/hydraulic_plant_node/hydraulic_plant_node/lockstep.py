@@ -36,7 +36,7 @@ class LockstepPorts(Protocol):
 
 
 class Lockstep:
-    """Waits for the source in command, once it has answered two samples in a row, and for recorders.
+    """Waits for the source in command, once it has answered two samples in a row, if late, and for recorders.
 
     Sources that send at a rate of their own answer no samples and are not waited for.
     """
@@ -45,6 +45,8 @@ class Lockstep:
         self._gate, self._ports, self._period_ns = gate, ports, period_ns
         self.given_up = 0
         self._given_up_ns = 0
+        self._heard = gate.answered_ns
+        self._answering = False
 
     def hold(self, stamp_ns: int, leaving: Callable[[], bool]) -> bool:
         """Return when the sample of `stamp_ns` has been answered (True), nobody is to answer it, or when `leaving`."""
@@ -53,20 +55,22 @@ class Lockstep:
         while not leaving() and not (self._answered(stamp_ns) and self._recorded(stamp_ns)):
             if time.monotonic() > give_up:
                 self.given_up += 1
-                self._given_up_ns = stamp_ns
+                self._given_up_ns, self._answering = stamp_ns, False
                 break
             self._ports.wait_for_command(_POLL_S)
             self._take(stamp_ns)
-        return self._gate.obeyed_ns[0] >= stamp_ns
+        return self._heard[0] >= stamp_ns
 
     def _take(self, stamp_ns: int) -> None:
         self._ports.take_commands(self._gate, stamp_ns)
         self._gate.drive(stamp_ns)  # a gate that has been disabled or stopped lets go of its source
 
     def _answered(self, stamp_ns: int) -> bool:
-        newest, before = self._gate.obeyed_ns
-        answers = self._gate.source and newest - before == self._period_ns and before > self._given_up_ns
-        return not answers or newest >= stamp_ns or not self._ports.commanders()
+        if self._heard != self._gate.answered_ns:
+            self._heard = newest, before = self._gate.answered_ns
+            self._answering = newest - before == self._period_ns
+        self._answering = self._answering and self._gate.enabled and self._ports.commanders() > 0
+        return not self._answering or self._heard[0] >= stamp_ns
 
     def _recorded(self, stamp_ns: int) -> bool:
         recorded_ns = self._ports.recorded_ns()

@@ -67,7 +67,7 @@ class PlantHealth:
             **counts,
         }
         timeouts = self._moved("timeouts", gate.timeouts)
-        problems = self._moved("problems", sum(counts.values()) - gate.counts[Verdict.ACCEPTED])
+        problems = self._moved("problems", sum(counts.values()) - counts["accepted"])
         if timeouts:
             message = f"watchdog: no command for {gate.watchdog:g} s, drive is 0 V"
             return self._status("command", WARN, message, values)
