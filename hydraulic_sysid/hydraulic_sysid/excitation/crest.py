@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array
+from hydraulic_sim.arrays import Array, Index
 
 _STEPS = 300
 _OVERSAMPLING = 16
@@ -16,7 +16,7 @@ def crest_factor(signal: Array) -> float:
     return float(np.max(np.abs(signal)) / np.sqrt(np.mean(np.square(signal))))
 
 
-def low_crest_phases(harmonics: Array, phases: Array) -> Array:
+def low_crest_phases(harmonics: Index, phases: Array) -> Array:
     """Phases (K,) [rad] of the sines at `harmonics` (K,) of equal amplitude, from `phases` (K,) on.
 
     Time-frequency swapping: clip the wave, keep the phases of what results and the amplitudes that are wanted, over
@@ -25,7 +25,7 @@ def low_crest_phases(harmonics: Array, phases: Array) -> Array:
     Source: E. Van der Ouderaa, J. Schoukens, J. Renneboog, IEEE Trans. Instrumentation and Measurement 37(1), 1988,
     pp. 145–147.
     """
-    k = np.asarray(harmonics, dtype=int)
+    k = harmonics
     size = 1 << int(np.ceil(np.log2(_OVERSAMPLING * (k.max() + 1))))
     spectrum = np.zeros(size // 2 + 1, dtype=complex)
     best, lowest = np.asarray(phases, dtype=float), np.inf

@@ -16,16 +16,16 @@ from ruamel.yaml.error import YAMLError
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.results import write_text
+from hydraulic_sysid.excitation.declared import Declared, number, section, text
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
 from hydraulic_sysid.excitation.prediction import Prediction
-from hydraulic_sysid.excitation.settings import Settings, number, section, text
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds
 
 PLAN_FOLDER = Path(__file__).parent / "plans"
 
 
 @dataclass(frozen=True)
-class Plan(Settings):
+class Plan(Declared):
     """What is played: a signal, how it is faded in and out, centred and bounded.
 
     The drive without centring is w(t)·(offset + signal(t)), where w is 0 during both rests and rises and
@@ -129,7 +129,7 @@ class Plan(Settings):
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any], folder: Path | None = None) -> Plan:
-        """Build from the content of a plan file; see `Settings.from_mapping`."""
+        """Build from the content of a plan file; see `Declared.from_mapping`."""
         values = dict(mapping)
         values["signal"] = _signal(values.get("signal"), folder)
         if isinstance(values.get("prediction"), Mapping):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hydraulic_sysid.excitation.settings import Settings, number, text
+from hydraulic_sysid.excitation.declared import Declared, number, text
 
 
 @dataclass(frozen=True)
-class Prediction(Settings):
+class Prediction(Declared):
     """The extremes of the plan simulated on a model, and what kept its amplitude from being larger."""
 
     label = "prediction"

@@ -65,7 +65,7 @@ class CsvTable:
         if len(lines) < 2:
             raise FileError(path, f"{len(lines)} rows of numbers", expected="at least two")
         self._rows, self._lines = rows, lines
-        self._width = len(cells)
+        self.width = len(cells)
         self._check_ragged()
         decimal = columns.decimal if columns else None
         if decimal is None:
@@ -84,7 +84,7 @@ class CsvTable:
         if not self.names:
             raise ColumnMapError(
                 f"{self.path}: no header such as time_s, drive_V, position_m; say by a column map what the "
-                f"{self._width} columns are"
+                f"{self.width} columns are"
             )
         try:
             found = dict(column_of_header(name) for name in self.names)
@@ -140,9 +140,9 @@ class CsvTable:
         else:
             widths = [line.count(self._delimiter) + 1 for line in self._lines]
         for index, width in enumerate(widths):
-            if width != self._width and len(self._cells(self._lines[index])) != self._width:
+            if width != self.width and len(self._cells(self._lines[index])) != self.width:
                 cells = len(self._cells(self._lines[index]))
-                raise FileError(self.path, f"{cells} cells", row=self._rows[index], expected=f"{self._width} cells")
+                raise FileError(self.path, f"{cells} cells", row=self._rows[index], expected=f"{self.width} cells")
 
     def _index(self, column: str | int) -> int:
         if isinstance(column, str):
@@ -150,8 +150,8 @@ class CsvTable:
                 there = ", ".join(self.names) if self.names else "no header"
                 raise FileError(self.path, f"no column {column!r}; there is {there}")
             return list(self.names).index(column)
-        if column > self._width:
-            raise FileError(self.path, f"no column {column}; there are 1 … {self._width}")
+        if column > self.width:
+            raise FileError(self.path, f"no column {column}; there are 1 … {self.width}")
         return column - 1
 
     def _parse(self, wanted: Sequence[int] | None) -> Array:

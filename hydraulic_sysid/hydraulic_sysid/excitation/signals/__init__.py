@@ -24,6 +24,5 @@ def signal_kinds() -> dict[str, type[Signal]]:
         module = importlib.import_module(f"{__name__}.{module_name}")
         for _, item in inspect.getmembers(module, inspect.isclass):
             if issubclass(item, Signal) and item.__module__ == module.__name__:
-                item.label = item.label or module_name
                 kinds[module_name] = item
     return kinds

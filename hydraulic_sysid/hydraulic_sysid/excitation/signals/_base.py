@@ -9,7 +9,7 @@ import numpy as np
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import Settings, declared_fields, number
+from hydraulic_sysid.excitation.declared import Declared, declared_fields, number
 
 S = TypeVar("S", bound="Signal")
 
@@ -20,12 +20,16 @@ def amplitude(doc: str) -> Any:
 
 
 @dataclass(frozen=True)
-class Signal(Settings):
+class Signal(Declared):
     """A drive signal without fades, offset or centring; those belong to the plan.
 
     To add a signal, put a file beside the others with one such class in it; its name in plans is the file's
     name.
     """
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.label = cls.__module__.rpartition(".")[2]
 
     def sample(self, t: Array) -> Array:
         """The drive [V] at the times `t` [s] from the signal's start; the same shape as `t`."""

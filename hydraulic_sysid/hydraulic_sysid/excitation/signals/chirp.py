@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import choice, number
+from hydraulic_sysid.excitation.declared import choice, number
 from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
@@ -25,8 +25,6 @@ class Chirp(Signal):
     Source: P. Flandrin, "Chirps everywhere", CNRS Lyon, 2002; A. Farina, AES 108th Convention, 2000, for the
     exponential law.
     """
-
-    label = "chirp"
 
     amplitude: float = amplitude("peak of the sweep")
     frequency_start: float = number("Hz", "frequency at the start of the sweep", above=0.0, maximum=1000.0)

@@ -8,8 +8,9 @@ import numpy as np
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import choice, integer, numbers
+from hydraulic_sysid.excitation.declared import choice, integer, numbers
 from hydraulic_sysid.excitation.signals._base import Signal
+from hydraulic_sysid.excitation.signals._lines import random_phases, sum_of_tones
 
 
 @dataclass(frozen=True)
@@ -22,8 +23,6 @@ class Multisine(Signal):
 
     [1] M. R. Schroeder, IEEE Trans. Information Theory 16(1), 1970, pp. 85–89.
     """
-
-    label = "multisine"
 
     frequencies: tuple[float, ...] = numbers("Hz", "the tones", minimum=1e-4, maximum=1000.0)
     amplitudes: tuple[float, ...] = numbers(
@@ -54,16 +53,3 @@ class Multisine(Signal):
     def sample(self, t: Array) -> Array:
         amplitudes = np.broadcast_to(self.amplitudes, len(self.frequencies))
         return sum_of_tones(t, np.array(self.frequencies), amplitudes, self.phase_angles())
-
-
-def random_phases(count: int, seed: int) -> Array:
-    """`count` phases [rad], even in 0 … 2π; the same for the same `seed` on every machine."""
-    return np.random.Generator(np.random.PCG64(seed)).uniform(0.0, 2 * np.pi, count)
-
-
-def sum_of_tones(t: Array, frequencies: Array, amplitudes: Array, phases: Array) -> Array:
-    """Σ A_k·sin(2π·f_k·t + φ_k) at the times `t` [s]; tone by tone, so that memory stays that of `t`."""
-    total = np.zeros(np.shape(t))
-    for frequency, amplitude, phase in zip(frequencies, amplitudes, phases, strict=True):
-        total += amplitude * np.sin(2 * np.pi * frequency * np.asarray(t) + phase)
-    return total

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sim.arrays import Array, Index
-from hydraulic_sysid.excitation.settings import integer, number
-from hydraulic_sysid.excitation.signals._base import Signal
-from hydraulic_sysid.excitation.signals.multisine import random_phases, sum_of_tones
+from hydraulic_sysid.excitation.declared import integer
+from hydraulic_sysid.excitation.signals._lines import BandOfLines, random_phases
 
 
 @dataclass(frozen=True)
-class OddRandomPhaseMultisine(Signal):
+class OddRandomPhaseMultisine(BandOfLines):
     """Odd multiples of 1/`period` within a band, one amplitude, random phases; of every `group` neighbours one is
     left out at random.
 
@@ -28,12 +25,6 @@ class OddRandomPhaseMultisine(Signal):
     Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., 2012, sec. 4.3.
     """
 
-    label = "odd_random_phase_multisine"
-
-    rms: float = number("V", "effective value of the sum", above=0.0, maximum=DRIVE_LIMIT_V)
-    period: float = number("s", "period; its inverse is the distance of the lines", above=0.0, maximum=3600.0)
-    frequency_min: float = number("Hz", "lower end of the band", above=0.0, maximum=1000.0)
-    frequency_max: float = number("Hz", "upper end of the band", above=0.0, maximum=1000.0)
     group: int = integer("odd neighbours of which one is left out", 3, minimum=2, maximum=1000)
     seed: int = integer("draws the phases", 0, minimum=0, maximum=2**32 - 1)
     lines_seed: int = integer("draws the lines that are left out", 0, minimum=0, maximum=2**32 - 1)
@@ -45,11 +36,7 @@ class OddRandomPhaseMultisine(Signal):
 
     def _odd(self) -> Index:
         """The odd harmonics of the band."""
-        slack = 1e-9  # a band that ends on a line includes it
-        first = math.ceil(self.frequency_min * self.period - slack)
-        last = math.floor(self.frequency_max * self.period + slack)
-        found = np.arange(first, last + 1)
-        return found[found % 2 == 1]
+        return self.band()[self.band() % 2 == 1]
 
     def left_out(self) -> Index:
         """The odd harmonics that are left out, one of each whole group, (G,)."""
@@ -63,15 +50,5 @@ class OddRandomPhaseMultisine(Signal):
         odd = self._odd()
         return np.setdiff1d(odd, self.left_out()) if odd.size >= self.group else odd[:0]
 
-    def lines(self) -> Array:
-        """The frequencies [Hz] that are played, (K,)."""
-        return np.asarray(self.excited() / self.period, dtype=np.float64)
-
-    @property
-    def highest_frequency(self) -> float:
-        return self.frequency_max
-
-    def sample(self, t: Array) -> Array:
-        lines = self.lines()
-        amplitudes = np.full(lines.size, self.rms * math.sqrt(2 / lines.size))
-        return sum_of_tones(t, lines, amplitudes, random_phases(lines.size, self.seed))
+    def phase_angles(self) -> Array:
+        return random_phases(self.excited().size, self.seed)

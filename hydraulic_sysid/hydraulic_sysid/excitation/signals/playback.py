@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import gzip
 import hashlib
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +12,9 @@ import numpy as np
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.data.errors import RecordError
+from hydraulic_sysid.excitation.declared import number, path, text
 from hydraulic_sysid.excitation.errors import PlaybackError
-from hydraulic_sysid.excitation.settings import number, path, text
 from hydraulic_sysid.excitation.signals._base import Signal
 
 TIME_COLUMN = "time_s"
@@ -31,8 +30,6 @@ class Playback(Signal):
     exactly two columns: time [s], drive [V]. Times start anywhere and rise; they need not be regular.
     `sha256` is filled in when the file is read, so that a plan that was played names the very content.
     """
-
-    label = "playback"
 
     file: str = path("the CSV file")
     gain: float = number("", "factor on the drive", 1.0, minimum=-100.0, maximum=100.0)
@@ -82,54 +79,32 @@ def read_drive(file: Path) -> tuple[Array, Array]:
         PlaybackError: no such columns, a value that is no finite number, or times that do not rise;
             names row and column.
     """
-    times: list[float] = []
-    drives: list[float] = []
+    from hydraulic_sysid.data.records.csv_file import CsvTable  # only here: few plans play a file back
+
     try:
-        with gzip.open(file, "rt", newline="") if file.suffix == ".gz" else open(file, newline="") as stream:
-            rows = csv.reader(stream)
-            columns: list[tuple[int, str]] | None = None
-            for row in rows:
-                if not row or (columns is None and row[0].lstrip().startswith("#")):
-                    continue
-                if columns is None:
-                    columns, is_header = _columns(file, [cell.strip() for cell in row])
-                    if is_header:
-                        continue
-                time, drive = (_number(file, rows.line_num, row, *column) for column in columns)
-                if times and time <= times[-1]:
-                    where = f"{file}: row {rows.line_num}, column {columns[0][1]}"
-                    raise PlaybackError(f"{where}: {time:g} s does not come after {times[-1]:g} s")
-                times.append(time)
-                drives.append(drive)
-    except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
-        raise PlaybackError(f"{file}: is not a readable CSV file: {error}") from error
-    if len(times) < 2:
-        raise PlaybackError(f"{file}: has {len(times)} rows of numbers; at least 2 are needed")
-    return np.array(times), np.array(drives)
+        table = CsvTable(file)
+        names = _columns(file, table.names, table.width)
+        times, drives = (table.numbers(name) for name in names)
+    except RecordError as error:
+        raise PlaybackError(str(error)) from error
+    for name, values in zip(names, (times, drives), strict=True):
+        for index in np.flatnonzero(~np.isfinite(values))[:1]:
+            where = f"{file}: row {table.row(index)}, column {table.label(name)}"
+            raise PlaybackError(f"{where}: {values[index]} is not a finite number")
+    for index in np.flatnonzero(np.diff(times) <= 0.0)[:1] + 1:
+        where = f"{file}: row {table.row(index)}, column {table.label(names[0])}"
+        raise PlaybackError(f"{where}: {times[index]:g} s does not come after {times[index - 1]:g} s")
+    return times, drives
 
 
-def _columns(file: Path, row: list[str]) -> tuple[list[tuple[int, str]], bool]:
-    """Index and name of the time and the drive column, and whether `row` is a header."""
-    if not any(cell[:1].isalpha() for cell in row):
-        if len(row) != 2:
-            raise PlaybackError(
-                f"{file}: has {len(row)} columns and no header; allowed without one: time [s], drive [V]"
-            )
-        return [(0, "1 (time)"), (1, "2 (drive)")], False
-    drive = next((name for name in DRIVE_COLUMNS if name in row), None)
-    if TIME_COLUMN not in row or drive is None:
+def _columns(file: Path, names: Sequence[str], width: int) -> tuple[str | int, str | int]:
+    """The time and the drive column, by their names or, without a header, by their numbers."""
+    if not names:
+        if width != 2:
+            raise PlaybackError(f"{file}: has {width} columns and no header; allowed without one: time [s], drive [V]")
+        return 1, 2
+    drive = next((name for name in DRIVE_COLUMNS if name in names), None)
+    if TIME_COLUMN not in names or drive is None:
         needed = f"{TIME_COLUMN} and {' or '.join(DRIVE_COLUMNS)}"
-        raise PlaybackError(f"{file}: header {', '.join(row)}; needed: {needed}")
-    return [(row.index(TIME_COLUMN), TIME_COLUMN), (row.index(drive), drive)], True
-
-
-def _number(file: Path, line: int, row: list[str], index: int, name: str) -> float:
-    if index >= len(row):
-        raise PlaybackError(f"{file}: row {line} has {len(row)} columns; column {name} is missing")
-    try:
-        value = float(row[index])
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise PlaybackError(f"{file}: row {line}, column {name}: {row[index]!r} is not a finite number")
-    return value
+        raise PlaybackError(f"{file}: header {', '.join(names)}; needed: {needed}")
+    return TIME_COLUMN, drive

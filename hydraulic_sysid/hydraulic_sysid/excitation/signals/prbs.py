@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import choice, integer, number
+from hydraulic_sysid.excitation.declared import choice, integer, number
 from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
@@ -22,8 +22,6 @@ class Prbs(Signal):
 
     [1] K. Godfrey, *Perturbation Signals for System Identification*, Prentice Hall 1993, ch. 1.
     """
-
-    label = "prbs"
 
     amplitude: float = amplitude("height of both levels")
     clock: float = number("s", "how long a bit stands", above=0.0, maximum=3600.0)

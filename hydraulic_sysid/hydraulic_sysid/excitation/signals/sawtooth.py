@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import number
+from hydraulic_sysid.excitation.declared import number
 from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
 @dataclass(frozen=True)
 class Sawtooth(Signal):
     """Rises evenly from 0 to +A, falls at once to −A and rises to 0 again: every harmonic, even and odd."""
-
-    label = "sawtooth"
 
     amplitude: float = amplitude("peak of the sawtooth")
     frequency: float = number("Hz", "how often it repeats", above=0.0, maximum=500.0)

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import number
+from hydraulic_sysid.excitation.declared import number
 from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
 @dataclass(frozen=True)
 class Sine(Signal):
     """u(t) = A·sin(2π·f·t + φ): a single frequency, so that all others in the response are distortion."""
-
-    label = "sine"
 
     amplitude: float = amplitude("peak of the sine")
     frequency: float = number("Hz", "how often it repeats", above=0.0, maximum=1000.0)

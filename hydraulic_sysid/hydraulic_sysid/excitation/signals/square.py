@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import number
+from hydraulic_sysid.excitation.declared import number
 from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
@@ -17,8 +17,6 @@ class Square(Signal):
 
     A shift of a quarter moves the piston of an integrating plant to both sides of its start.
     """
-
-    label = "square"
 
     amplitude: float = amplitude("height of the square")
     frequency: float = number("Hz", "how often it repeats", above=0.0, maximum=500.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import integer, number
+from hydraulic_sysid.excitation.declared import integer, number
 from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
@@ -17,8 +17,6 @@ class Staircase(Signal):
 
     The levels sum to zero, so that an integrating plant ends where it began.
     """
-
-    label = "staircase"
 
     amplitude: float = amplitude("height of the highest stair")
     hold: float = number("s", "how long each level stands", above=0.0, maximum=3600.0)

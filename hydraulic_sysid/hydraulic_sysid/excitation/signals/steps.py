@@ -8,7 +8,7 @@ import numpy as np
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import number, numbers
+from hydraulic_sysid.excitation.declared import number, numbers
 from hydraulic_sysid.excitation.signals._base import Signal
 
 
@@ -16,8 +16,6 @@ from hydraulic_sysid.excitation.signals._base import Signal
 class Steps(Signal):
     """The levels one after the other, each held for `hold`, then over again; rising levels make a
     staircase."""
-
-    label = "steps"
 
     levels: tuple[float, ...] = numbers("V", "the levels in their order", minimum=-DRIVE_LIMIT_V, maximum=DRIVE_LIMIT_V)
     hold: float = number("s", "how long each level stands", above=0.0, maximum=3600.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.excitation.settings import number
+from hydraulic_sysid.excitation.declared import number
 from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 
@@ -17,8 +17,6 @@ class Triangle(Signal):
 
     It shows what sits around null: deadband, stiction, underlap, bias.
     """
-
-    label = "triangle"
 
     amplitude: float = amplitude("peak of the triangle")
     frequency: float = number("Hz", "how often it repeats", above=0.0, maximum=1000.0)
