@@ -40,8 +40,10 @@ def physical(
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def linear(turn, push, residues, direct, late, law, state, dt, wanted, out):
-    """Loop around an identified model at rest: modes xₖ₊₁ = turn·xₖ + push·u, y = Re(residues·x) + direct·u, with the
-    drive ``late`` samples late. ``wanted`` and ``out`` as in `physical`."""
+    """Loop around an identified model at rest, its drive ``late`` samples late.
+
+    Modes xₖ₊₁ = turn·xₖ + push·u, y = Re(residues·x) + direct·u; ``wanted`` and ``out`` as in `physical`.
+    """
     modes = np.zeros(len(turn), dtype=np.complex128)
     drives = np.zeros(len(wanted) + late + 1)
     for i in range(len(wanted)):

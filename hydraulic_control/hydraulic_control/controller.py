@@ -16,8 +16,8 @@ from hydraulic_control.parameters import RECORD
 class Controller:
     """NPID or one of its peers; the drive is always finite and within ``drive_limit``.
 
-    ``values`` are parameters by name (`parameters.LAW`), the others have their defaults. Raises
-    `ControlError` for an unknown name or a value that is not allowed.
+    :param values: parameters by name (`parameters.LAW`); the others have their defaults
+    :raises HydraulicError: an unknown name or a value that is not allowed.
     """
 
     def __init__(self, values: Mapping[str, Any] | None = None) -> None:
@@ -47,7 +47,10 @@ class Controller:
         return bool(self._state["running"][0])
 
     def set(self, values: Mapping[str, Any]) -> None:
-        """Change parameters while running, without a bump in the drive. Raises as the constructor, nothing changed."""
+        """Change parameters while running, without a bump in the drive.
+
+        :raises HydraulicError: as the constructor; nothing is changed then.
+        """
         changed = self._values | {name: parameters.check(name, value) for name, value in values.items()}
         self._write(changed)
         self._values = changed
@@ -62,8 +65,10 @@ class Controller:
     def step(
         self, dt: float, reference: float, reference_velocity: float, position: float, force: float = float("nan")
     ) -> float:
-        """Drive [V] for a sample ``dt`` [s] after the last: reference [m], its velocity [m/s], position [m], force [N]
-        (NaN where not measured)."""
+        """Drive [V] for a sample ``dt`` [s] after the last.
+
+        Reference [m], its velocity [m/s], position [m] and force [N] (NaN where not measured).
+        """
         return step(self._record, self._state, dt, reference, reference_velocity, position, force)
 
     def _write(self, values: Mapping[str, Any]) -> None:

@@ -33,7 +33,10 @@ def shipped() -> tuple[str, ...]:
 
 
 def find(name_or_path: str | Path) -> Path:
-    """The file of that path, or the shipped one of that name. Raises `ControlError` where there is none."""
+    """The file of that path, or the shipped one of that name.
+
+    :raises ControlError: there is none.
+    """
     for path in (Path(name_or_path), FOLDER / f"{name_or_path}.yaml"):
         if path.is_file():
             return path
@@ -43,7 +46,7 @@ def find(name_or_path: str | Path) -> Path:
 def load(name_or_path: str | Path) -> dict[str, Any]:
     """Parameters of the controller in a file, checked; not all need to be there.
 
-    Raises `ControlError` for a file that is no such file, and for values that are not allowed.
+    :raises ControlError: a file that is no such file, or values that are not allowed.
     """
     path = find(name_or_path)
     try:

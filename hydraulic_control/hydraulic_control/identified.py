@@ -64,10 +64,11 @@ class IdentifiedModel:
 def from_coefficients(
     numerator: ArrayLike, denominator: ArrayLike, sampling_time: float | None, delay: float = 0.0, name: str = "model"
 ) -> IdentifiedModel:
-    """Model of a transfer function in descending powers of z (sampled every ``sampling_time`` [s]), or of s where that
-    is None or 0.
+    """Model of a transfer function in descending powers of z, sampled every ``sampling_time`` [s].
 
-    Raises `ControlError` for coefficients that are no proper transfer function, and for repeated poles.
+    Without a sampling time (None or 0) they are powers of s.
+
+    :raises ControlError: coefficients that are no proper transfer function, or repeated poles.
     """
     num, den = (np.trim_zeros(np.atleast_1d(np.asarray(c, dtype=float)), "f") for c in (numerator, denominator))
     if not (len(num) and len(den) >= 2 and len(num) <= len(den) and np.isfinite([*num, *den]).all()):
@@ -101,10 +102,12 @@ def _continuous(z: NDArray, residues: NDArray, period: float, name: str) -> tupl
 
 
 def load_identified(path: Path | str) -> IdentifiedModel:
-    """Model in a file that ``hydraulic_sysid identify`` writes (linear_model.json, or identify.json), or in any JSON
-    file with numerator, denominator, sampling_time [s], domain (discrete or continuous) and, if it has one, delay [s].
+    """The model in a JSON file, as ``hydraulic_sysid identify`` writes it or alike.
 
-    Raises `ControlError` for a file that cannot be read or holds no transfer function from V to m.
+    The file holds numerator, denominator, sampling_time [s], domain (discrete or continuous) and, if there is one,
+    delay [s].
+
+    :raises ControlError: a file that cannot be read or holds no transfer function from V to m.
     """
     file = Path(path)
     try:

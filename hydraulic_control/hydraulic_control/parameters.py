@@ -80,7 +80,7 @@ def check(name: str, value: Any) -> Any:
 
 
 def complete(values: Mapping[str, Any]) -> dict[str, Any]:
-    """All parameters: `values` where given, else defaults. Raises as `check` does."""
+    """All parameters: `values` where given and found acceptable (`check`), else defaults."""
     return default_values() | {name: check(name, value) for name, value in values.items()}
 
 

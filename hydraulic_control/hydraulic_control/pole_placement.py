@@ -48,10 +48,9 @@ def oscillator(frequency: float, damping: float, period: float) -> np.ndarray:
 def design(
     velocity_gain: float, lag: float, frequency: float, damping: float, observer: float, period: float
 ) -> Polynomials:
-    """Polynomials that place the closed loop's poles at (frequency [rad/s], damping) and the observer's at two equal
-    real ones.
+    """Polynomials that place the closed loop's poles, and two equal real ones of the observer [rad/s].
 
-    Raises `ControlError` where the poles lie too high for the period, or the model cannot be solved for.
+    :raises ControlError: the poles lie too high for the period, or the model cannot be solved for.
     """
     if max(frequency, observer) * period > math.pi:
         raise ControlError(

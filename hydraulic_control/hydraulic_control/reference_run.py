@@ -19,7 +19,7 @@ _LONGEST = 4_000_000  # samples kept
 class ReferenceRun:
     """Answers every state with a reference until the trajectory has been played, and keeps the response.
 
-    Raises `ControlError` for a trajectory that is not possible within the limits.
+    :raises ControlError: a trajectory that is not possible within the limits.
     """
 
     def __init__(self, kind: str, settings: Mapping[str, Any], limits: MotionLimits) -> None:

@@ -26,8 +26,11 @@ _DRIFT_GAIN = 0.2  # of the relay's amplitude: how far its centre may follow a d
 
 @dataclass(frozen=True)
 class RelaySettings:
-    """``amplitude`` d [V] and ``hysteresis`` ε [m] of the relay; it ends after ``cycles`` that agree within
-    ``agreement``, and is broken off beyond ``travel`` [m] from where it began or after ``time_limit`` [s]."""
+    """``amplitude`` d [V] and ``hysteresis`` ε [m] of the relay, and when it ends.
+
+    That is after ``cycles`` that agree within ``agreement``; it is broken off beyond ``travel`` [m] from where it began
+    or after ``time_limit`` [s].
+    """
 
     amplitude: float = 0.5
     hysteresis: float = 6e-5
@@ -144,7 +147,7 @@ class Relay:
 def measure(plant: Any, settings: RelaySettings, dt: float = 1e-3) -> CriticalPoint:
     """Run the experiment on a plant in this process (`simulation.LoopPlant`).
 
-    Raises `ControlError` where it was broken off.
+    :raises ControlError: it was broken off.
     """
     relay, drive = Relay(settings), 0.0
     while not relay.done:

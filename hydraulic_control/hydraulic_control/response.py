@@ -36,7 +36,10 @@ class Response:
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Response:
-        """The response in such a document. Raises `ControlError` where a column is missing or too short."""
+        """The response in such a document.
+
+        :raises ControlError: a column is missing or too short.
+        """
         columns = {}
         for field in fields(cls):
             try:
@@ -51,10 +54,10 @@ class Response:
 
 @dataclass(frozen=True)
 class StepFigures:
-    """Of one step: rise time 10 … 90 % [s], settling time into ±2 % [s], overshoot [%], steady-state error [m], RMS
-    error [m], integral of the squared error [m²·s], RMS drive [V] and the mean speed of the drive [V/s].
+    """Of one step.
 
-    What is not reached is infinite.
+    Rise time 10 … 90 % [s], settling time into ±2 % [s], overshoot [%], steady-state error [m], RMS error [m], integral
+    of the squared error [m²·s], RMS drive [V] and the mean speed of the drive [V/s]. What is not reached is infinite.
     """
 
     rise_time: float
@@ -70,8 +73,9 @@ class StepFigures:
 def step_figures(response: Response) -> StepFigures:
     """Figures of the only step in the reference; before it the loop rests.
 
-    The steady state is the mean over the last tenth. Raises `ControlError` where the reference does not step
-    exactly once, or nothing comes after it.
+    The steady state is the mean over the last tenth.
+
+    :raises ControlError: the reference does not step exactly once, or nothing comes after it.
     """
     jumps = np.flatnonzero(np.diff(response.reference) != 0.0)
     if len(jumps) != 1:

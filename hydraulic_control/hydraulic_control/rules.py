@@ -45,8 +45,9 @@ def pole_placement(velocity_gain: float, lag: float, frequency: float, damping: 
     """Poles of the loop around K/(s(Ts + 1)) at ``frequency`` [rad/s] with ``damping`` and at a tenth of it, [3].
 
     T·s³ + (1 + K·Kd)·s² + K·Kp·s + K·Ki = T'·(s + ω/10)(s² + 2ζω·s + ω²) with the derivative left out where the lag
-    alone is too short to need it: the gains that are negative are 0. Raises `ControlError` for values that are
-    not positive.
+    alone is too short to need it: the gains that are negative are 0.
+
+    :raises ControlError: values that are not positive.
     """
     if not min(velocity_gain, lag, frequency, damping) > 0.0:
         raise ControlError(

@@ -27,8 +27,11 @@ class LoopPlant(Protocol):
     """What a loop can be closed around."""
 
     def close_loop(self, controller: Controller, wanted: Array, dt: float) -> tuple[Array, int]:
-        """From its start in a loop with ``controller``: (N, 2) true position [m] and applied drive [V] for
-        ``wanted`` (N, 2), reference [m] and its velocity [m/s]; and how many samples could be followed."""
+        """Run from its start in a loop with ``controller``.
+
+        :param wanted: (N, 2) reference [m] and its velocity [m/s]
+        :return: (N, 2) true position [m] and applied drive [V], and how many samples could be followed
+        """
 
 
 @dataclass(frozen=True)

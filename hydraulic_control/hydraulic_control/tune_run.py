@@ -40,8 +40,11 @@ def critical_points(
     relay: RelaySettings | None,
     measured: CriticalPoint | None,
 ) -> list[CriticalResult]:
-    """Critical points of the linearised plant, the identified models, and a relay experiment (``measured`` on a bench,
-    or run here on the plant where ``relay`` is given)."""
+    """Critical points of the linearised plant, the identified models, and a relay experiment.
+
+    :param relay: run the experiment here on the plant
+    :param measured: its result on a bench instead
+    """
     found = [CriticalResult("linearised at rest", critical_of_model(model), "dry friction left out")]
     for one in models:
         point = critical_of_identified(one)
@@ -73,8 +76,10 @@ def by_rule(found: Sequence[CriticalResult], velocity_gain: float, lag: float) -
 
 
 def simple_model(model: Model, models: Sequence[IdentifiedModel]) -> tuple[float, float]:
-    """Velocity gain [m/(s·V)] and lag [s] of the model K/(s(Ts + 1)): from the first identified model, else from the
-    physics; the lag is that of spool and loop."""
+    """Velocity gain [m/(s·V)] and lag [s] of the model K/(s(Ts + 1)).
+
+    The gain is that of the first identified model, else of the physics; the lag is that of spool and loop.
+    """
     gain = models[0].velocity_gain if models else closed_form(model).velocity_gain
     spool = 0.0
     if "spool_dynamics" in model.effects:

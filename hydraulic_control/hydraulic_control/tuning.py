@@ -131,7 +131,9 @@ def optimise(
     """Better values than ``start`` for those that are free (by default what `FREE` says of its law).
 
     Nelder–Mead on the logarithms, begun twice: the second time from where the first one stopped, which frees a simplex
-    that has shrunk too early. Raises `ControlError` for a start or free names that are not allowed.
+    that has shrunk too early.
+
+    :raises ControlError: a start or free names that are not allowed.
     """
     law = Controller(start).values["controller"]
     names = tuple(FREE[law] if free is None else free)

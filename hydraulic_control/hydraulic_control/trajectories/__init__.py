@@ -34,8 +34,8 @@ KINDS: dict[str, Any] = {
 def make(kind: str, settings: Mapping[str, Any], limits: MotionLimits) -> Trajectory:
     """The trajectory of that kind, within the limits.
 
-    ``settings``: offset [m], amplitude [m], frequency [Hz], cycles, levels, dwell [s], file. Raises
-    `ControlError` for an unknown kind, or where it would leave the limits.
+    :param settings: offset [m], amplitude [m], frequency [Hz], cycles, levels, dwell [s], file
+    :raises ControlError: an unknown kind, or it would leave the limits.
     """
     if kind not in KINDS:
         raise ControlError(f"reference kind is {kind!r}; allowed are {', '.join(KINDS)}")

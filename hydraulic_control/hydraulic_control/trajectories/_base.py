@@ -55,9 +55,11 @@ class Profile:
 
 
 def check_limits(name: str, trajectory: Trajectory, limits: MotionLimits) -> None:
-    """Raise `ControlError` where the trajectory leaves the limits: what, how far, what is allowed.
+    """Refuse a trajectory that leaves the limits.
 
     A step and a staircase jump: of them only the travel is checked, the actuator goes as fast as it can.
+
+    :raises ControlError: it leaves them; the text says what, how far, and what is allowed.
     """
     count = min(int(trajectory.duration / _GRID_S) + 2, _LONGEST_GRID)
     time = np.linspace(-_GRID_S, trajectory.duration + _GRID_S, count + 2)

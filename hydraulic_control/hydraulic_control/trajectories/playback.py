@@ -52,8 +52,8 @@ class Playback:
 def read_points(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and positions [m] of a CSV file.
 
-    Raises `ControlError` for a file that cannot be read, lacks a column, or holds less than two points,
-    values that are no numbers, or times that do not increase.
+    :raises ControlError: a file that cannot be read, lacks a column, or holds less than two points, values that are no
+        numbers, or times that do not increase.
     """
     try:
         with path.open(newline="", encoding="utf-8") as stream:

@@ -11,8 +11,10 @@ from .minimum_jerk import blend
 
 @dataclass(frozen=True)
 class Sine(Profile):
-    """``amplitude`` [m] around ``offset`` [m] at ``frequency`` [Hz] for ``cycles``; it swells and fades over one more
-    cycle each, so that it begins and ends at rest."""
+    """``amplitude`` [m] around ``offset`` [m] at ``frequency`` [Hz] for ``cycles``.
+
+    It swells and fades over one more cycle each, so that it begins and ends at rest.
+    """
 
     frequency: float
     cycles: int

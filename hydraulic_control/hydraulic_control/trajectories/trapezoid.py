@@ -10,8 +10,11 @@ from ._base import Profile
 
 @dataclass(frozen=True)
 class Trapezoid(Profile):
-    """From ``offset`` [m] by ``amplitude`` [m] at the limits of ``velocity`` [m/s] and ``acceleration`` [m/s²],
-    ``dwell`` [s] of rest, and back. A way too short for full speed has a triangular profile."""
+    """From ``offset`` [m] by ``amplitude`` [m], ``dwell`` [s] of rest, and back.
+
+    It goes at the limits of ``velocity`` [m/s] and ``acceleration`` [m/s²]; a way too short for full speed has a
+    triangular profile.
+    """
 
     velocity: float
     acceleration: float

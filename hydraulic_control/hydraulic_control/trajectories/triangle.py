@@ -12,8 +12,10 @@ from ._base import Profile
 
 @dataclass(frozen=True)
 class Triangle(Profile):
-    """``amplitude`` [m] around ``offset`` [m] at ``frequency`` [Hz] for ``cycles``: constant speed between corners of
-    constant ``acceleration`` [m/s²]. It begins and ends at rest, at ``offset − amplitude``.
+    """``amplitude`` [m] around ``offset`` [m] at ``frequency`` [Hz] for ``cycles``.
+
+    Constant speed between corners of constant ``acceleration`` [m/s²]; it begins and ends at rest, at ``offset −
+    amplitude``.
 
     :raises ControlError: the acceleration cannot turn it round in time.
     """

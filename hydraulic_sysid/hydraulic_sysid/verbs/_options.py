@@ -53,8 +53,11 @@ def run(
     argv: Sequence[str] | None = None,
     bulky: Sequence[str] = (),
 ) -> int:
-    """Do a verb's work; keep its document, files and page in ``--out``; show it as a table or, with ``--json``, as it
-    is but for its ``bulky`` entries. Returns the exit code."""
+    """Do a verb's work, keep its document, files and page in ``--out``, and show it; the exit code.
+
+    :param show: prints the result as tables
+    :param bulky: entries that ``--json`` leaves out
+    """
     verb = parser.prog.rpartition(" ")[2]
     parser.add_argument(
         "--out", metavar="DIR", type=Path, required=True, help="folder of the results; others in it are kept"
