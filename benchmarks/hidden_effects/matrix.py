@@ -75,7 +75,7 @@ def held_out_ratio(bench: benches.Bench, model: Any, after: Any, records: Any, f
     begins at the true values.
     """
     from hydraulic_sysid.diagnosis.calibrate import calibrate
-    from hydraulic_sysid.estimation.estimate import evaluate
+    from hydraulic_sysid.estimation.fit import evaluate
 
     true = model
     truth = bench.truth()

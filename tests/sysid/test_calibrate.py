@@ -21,8 +21,8 @@ from hydraulic_sim.model import Entry, Model
 from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
-from hydraulic_sysid.diagnosis.calibrate import CalibrationError, Settings, calibrate
-from hydraulic_sysid.estimation.noise import noise_floor, robust_noise_floor
+from hydraulic_sysid.diagnosis.calibrate import CalibrationError, FitSettings, calibrate
+from hydraulic_sysid.estimation.noise import noise_std, robust_noise_std
 from hydraulic_sysid.report import render
 from hydraulic_sysid.report.calibrate import figures as calibrate_figures
 from hydraulic_sysid.verbs import calibrate as verb
@@ -233,23 +233,23 @@ def test_robust_loss_survives_dropouts(axis: list[dict[str, Array]], model: Mode
         spoiled.append(Record.sampled(record.name, DT, wild, record.source))
     off = {}
     for robust in (False, True):
-        result = calibrate(model, spoiled, (), Settings(robust=robust)).result
+        result = calibrate(model, spoiled, (), FitSettings(robust=robust)).result
         off[robust] = {p["key"]: abs(p["value"] / TRUTH[p["key"]] - 1.0) for p in result["parameters"]}
     assert max(off[True].values()) < 0.05
     assert max(off[False].values()) > 0.1
 
 
-def test_robust_noise_floor_does_not_follow_outliers() -> None:
+def test_robust_noise_std_does_not_follow_outliers() -> None:
     draw = np.random.default_rng(0)
     signal = np.sin(np.arange(5000) / 50.0) + 1e-3 * draw.standard_normal(5000)
-    assert robust_noise_floor(signal) == pytest.approx(1e-3, rel=0.1)
+    assert robust_noise_std(signal) == pytest.approx(1e-3, rel=0.1)
     signal[draw.choice(5000, 50, replace=False)] += 0.3
-    assert robust_noise_floor(signal) == pytest.approx(1e-3, rel=0.25)
-    assert noise_floor(signal) > 1e-2
+    assert robust_noise_std(signal) == pytest.approx(1e-3, rel=0.25)
+    assert noise_std(signal) > 1e-2
 
 
 def test_one_piece_is_a_free_run(records: list[Record], model: Model) -> None:
-    done = calibrate(model, records, (), Settings(length=1e9), ["moving_mass", "bulk_modulus", "valve_flow"])
+    done = calibrate(model, records, (), FitSettings(length=1e9), ["moving_mass", "bulk_modulus", "valve_flow"])
     assert done.result["converged"]
     for key in ("moving_mass", "bulk_modulus", "valve_flow"):
         assert done.model.value(key) == pytest.approx(TRUTH[key], rel=0.1)
@@ -311,7 +311,7 @@ def test_unusable_input_is_named(records: list[Record], model: Model) -> None:
         (lambda: calibrate(model, records, keys=["coulomb_friction.level"]), "not in the model"),
         (lambda: calibrate(model, [short]), "short: .* 15"),
         (lambda: calibrate(model, [blind]), "blind: no channel 'position'"),
-        (lambda: calibrate(model, records, settings=Settings(length=-1.0)), "must be positive"),
+        (lambda: calibrate(model, records, settings=FitSettings(length=-1.0)), "must be positive"),
         (lambda: calibrate(model, []), "no record"),
         (lambda: calibrate(model, records, [records[1]]), "also among those to fit: record_1"),
         (lambda: calibrate(model, records, [part]), r"also among those to fit: record_0\[1–3 s\]"),

@@ -7,7 +7,7 @@ import pytest
 
 from hydraulic_sysid.data.resampling import held_average, sampled
 from hydraulic_sysid.estimation import metrics
-from hydraulic_sysid.estimation.noise import noise_floor, resolution
+from hydraulic_sysid.estimation.noise import noise_std, resolution
 
 Y = [1.0, 2.0, 3.0, 4.0]
 P = [1.0, 2.0, 3.0, 6.0]
@@ -62,20 +62,20 @@ def test_white_noise_stays_within_the_bound() -> None:
 
 
 @pytest.mark.parametrize("sigma", [2e-5, 1e-3])
-def test_noise_floor_of_a_moving_rounded_signal(sigma: float) -> None:
+def test_noise_std_of_a_moving_rounded_signal(sigma: float) -> None:
     t = np.arange(0.0, 20.0, 1e-3)
     rng = np.random.default_rng(3)
     motion = 0.2 * np.sin(2 * np.pi * 0.7 * t) + 0.01 * np.sign(np.sin(2 * np.pi * 0.3 * t))
     lsb = 2.4e-5
     measured = np.round((motion + sigma * rng.standard_normal(t.size)) / lsb) * lsb
     expected = np.hypot(sigma, lsb / np.sqrt(12.0))
-    assert noise_floor(measured) == pytest.approx(expected, rel=0.05)
+    assert noise_std(measured) == pytest.approx(expected, rel=0.05)
     assert resolution(measured) == pytest.approx(lsb, rel=1e-6)
 
 
-def test_noise_floor_of_a_rounded_still_signal_is_its_rounding() -> None:
+def test_noise_std_of_a_rounded_still_signal_is_its_rounding() -> None:
     y = np.repeat([0.0, 0.01, 0.02], 200)
-    assert noise_floor(y) == pytest.approx(0.01 / np.sqrt(12.0))
+    assert noise_std(y) == pytest.approx(0.01 / np.sqrt(12.0))
 
 
 def test_resampling_keeps_an_integrator_exact() -> None:

@@ -27,7 +27,7 @@ from hydraulic_sysid.diagnosis.next_experiment import (
 from hydraulic_sysid.diagnosis.next_experiment.evidence import Point, as_record, evidence
 from hydraulic_sysid.diagnosis.next_experiment.movements import FAMILIES, Bench, Movement, every
 from hydraulic_sysid.diagnosis.next_experiment.reference import Leader, play
-from hydraulic_sysid.estimation.estimate import fit
+from hydraulic_sysid.estimation.fit import fit
 from hydraulic_sysid.excitation import Plan, load_plan
 from hydraulic_sysid.excitation.amplitude import largest
 from hydraulic_sysid.excitation.design import Wish, propose
@@ -231,7 +231,7 @@ def test_an_axis_without_hydraulics() -> None:
 @pytest.mark.parametrize(
     ("rivals", "noise", "seconds", "complaint"),
     [
-        (1, NOISE, 20.0, "1 rival given"),
+        (1, NOISE, 20.0, "1 model given"),
         (2, {}, 20.0, "the position's is needed"),
         (2, {"position": 0.0}, 20.0, "noise of position is 0"),
         (2, {"position": 1e-5, "smell": 1.0}, 20.0, "'smell'"),

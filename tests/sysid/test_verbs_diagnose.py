@@ -46,7 +46,7 @@ def test_why_not_the_runner_up_is_said_with_its_figure(run: Path) -> None:
     found = json.loads((run / "diagnose.json").read_text())
     second = found["competing_models"]["valve_deadband"][0]
     assert second["distinguishable"] and second["residual_after"] > 5.0
-    assert f"Why not {second['name']}" in found["verdict"]["text"]
+    assert f"{second['name']} instead of valve_deadband leaves" in found["verdict"]["text"]
 
 
 def test_the_model_that_was_written_has_the_effect_and_says_where_from(run: Path) -> None:

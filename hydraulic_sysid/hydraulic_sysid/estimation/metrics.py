@@ -11,10 +11,12 @@ References ----------
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from hydraulic_sim.arrays import Array
 
 
-def _pair(measured: ArrayLike, predicted: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pair(measured: ArrayLike, predicted: ArrayLike) -> tuple[Array, Array]:
     y, p = np.asarray(measured, dtype=float), np.asarray(predicted, dtype=float)
     if y.shape != p.shape or y.ndim != 1 or y.size == 0:
         raise ValueError(f"measured {y.shape} and predicted {p.shape} must be equal, one-dimensional and not empty")
@@ -72,13 +74,13 @@ def fpe(loss: float, parameters: int, samples: int) -> float:
     return loss * (1.0 + share) / (1.0 - share)
 
 
-def autocorrelation(residual: ArrayLike, lags: int) -> NDArray[np.float64]:
+def autocorrelation(residual: ArrayLike, lags: int) -> Array:
     """Normalised autocorrelation of a residual, lags 0 … ``lags`` (1 at lag 0)."""
     e = np.asarray(residual, dtype=float)
     return cross_correlation(e, e, lags)[lags:]
 
 
-def cross_correlation(signal: ArrayLike, residual: ArrayLike, lags: int) -> NDArray[np.float64]:
+def cross_correlation(signal: ArrayLike, residual: ArrayLike, lags: int) -> Array:
     """Normalised cross-correlation of ``signal(t − τ)`` and ``residual(t)``, lags τ = −``lags`` … ``lags``.
 
     Of two independent sequences, one of them white, 95 % of the values lie within ±1.96/√N, [1] section 16.6.

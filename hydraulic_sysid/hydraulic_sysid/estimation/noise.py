@@ -14,9 +14,11 @@ and motion near the Nyquist frequency is counted as noise.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import comb
 from scipy.stats import chi2
+
+from hydraulic_sim.arrays import Array
 
 METHOD = "median over blocks of the mean square of fourth differences (white noise), at least LSB/√12"
 _ORDER = 4
@@ -50,7 +52,7 @@ def code_step(signal: ArrayLike) -> float:
     return float(slope) if float(np.max(np.abs(off))) < 0.1 * slope else 0.0
 
 
-def noise_floor(signal: ArrayLike) -> float:
+def noise_std(signal: ArrayLike) -> float:
     """Standard deviation of the white measurement noise in a signal ``(N,)``, in the signal's unit.
 
     :raises ValueError: for fewer than 20 samples.
@@ -62,8 +64,8 @@ def noise_floor(signal: ArrayLike) -> float:
     return float(max(np.sqrt(np.median(whole)), resolution(y) / np.sqrt(12.0)))
 
 
-def robust_noise_floor(signal: ArrayLike) -> float:
-    """As `noise_floor`, of a signal ``(N,)`` in which a few samples are wild; motion counts more.
+def robust_noise_std(signal: ArrayLike) -> float:
+    """As `noise_std`, of a signal ``(N,)`` in which a few samples are wild; motion counts more.
 
     The median of all squared differences instead of that of the blocks' means: of normal noise it is 0.455 of the
     mean (the median of χ² with one degree of freedom), and an outlier spoils five of them, not a block.
@@ -74,13 +76,13 @@ def robust_noise_floor(signal: ArrayLike) -> float:
     return float(max(np.sqrt(np.median(_squares(y)) / chi2.median(1)), resolution(y) / np.sqrt(12.0)))
 
 
-def _checked(signal: ArrayLike) -> NDArray[np.float64]:
+def _checked(signal: ArrayLike) -> Array:
     y = np.asarray(signal, dtype=float)
     if y.ndim != 1 or y.size < 20:
-        raise ValueError(f"a noise floor needs at least 20 samples, got shape {y.shape}")
+        raise ValueError(f"the noise needs at least 20 samples, got shape {y.shape}")
     return y
 
 
-def _squares(y: NDArray[np.float64]) -> NDArray[np.float64]:
+def _squares(y: Array) -> Array:
     """Squared fourth differences, scaled so that their mean is the variance of white noise."""
     return np.diff(y, _ORDER) ** 2 / comb(2 * _ORDER, _ORDER)

@@ -1,168 +1,144 @@
-"""Runs a plant over all pieces of all records, and differentiates by parameters and by initial states."""
+"""Runs a plant over all segments of all records, and differentiates by parameters and by initial states."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.plant import Plant
 
-from .segments import Pieces
+from .parameters import Parameters
+from .projection import Projection
+from .segments import Segments
 
-Array = NDArray[np.float64]
+T = TypeVar("T")
 
-_STEP = 2e-3  # difference step of a parameter, of its scale
+_STEP = 2e-3  # difference step of a parameter, of its value, …
+_LEAST_STEP = 0.1  # … or of so much of its scale
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel
 _VELOCITY_STEP = 1e-3  # m/s
 _PRESSURE_STEP = 1e5  # Pa, where the pressure is not measured
 
 
 @dataclass(frozen=True)
-class Linear:
-    """Residuals of one record at a point, with the initial states eliminated.
-
-    ``raw`` (S, m): measured − simulated in units of the noise, priors of the start appended; ``residual`` (S, m): the
-    same after the best (linear) change of each start; ``basis`` (S, m, F) orthonormal columns of what the starts can
-    explain; ``back`` (S, F, m) the change of the starts that a residual asks for.
-    """
-
-    raw: Array
-    basis: Array
-    back: Array
-
-    @cached_property
-    def residual(self) -> Array:
-        """See above."""
-        return self.project(self.raw)
-
-    def project(self, values: Array) -> Array:
-        """What of (S, m) the initial states cannot explain."""
-        inner = self.basis.transpose(0, 2, 1) @ values[..., None]
-        return values - (self.basis @ inner)[..., 0]
-
-
 class Shooting:
-    """A plant and the pieces it is run over; ``starts`` are changed by `settle`.
+    """A plant and the segments it is run over; initial states are passed in, per record (S, n_states).
 
     ``misfit``: how many times the noise the model is off. While it is far off, pressures that nobody measured would
     take up its errors and leave all physical bounds; their priors count that many times.
     """
 
-    def __init__(self, plant: Plant, pieces: Sequence[Pieces], workers: int | None = None) -> None:
-        self.plant, self.pieces = plant, list(pieces)
-        self.starts = [p.states.copy() for p in self.pieces]
-        self.misfit = 1.0
-        self._unseen = [_unseen(plant, p) for p in self.pieces]
-        self._pool = _workers(workers or os.cpu_count() or 1)
+    plant: Plant
+    segments: Sequence[Segments]
+    misfit: float = 1.0
 
     @property
-    def guesses(self) -> bool:
-        """Whether any start has pressures that were not measured."""
-        return any(bool(u.any()) for u in self._unseen)
+    def initial_states(self) -> list[Array]:
+        """As the records show them."""
+        return [s.initial_states for s in self.segments]
 
-    def residuals(self, values: Mapping[str, float], starts: Sequence[Array] | None = None) -> list[Array]:
-        """(S, m) per record, measured − simulated over noise with the starts' priors appended."""
-        return self.run(self.plant.with_parameters(dict(values)), starts)
+    def residuals(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
+        """(S, m) per record: measured − simulated over the noise, the priors of the initial states appended."""
+        return self._map(lambda i: self._residual(plant, i, initial_states[i]), range(len(self.segments)))
 
-    def run(self, plant: Plant, starts: Sequence[Array] | None = None) -> list[Array]:
-        """As `residuals`, of another plant."""
-        chosen = self.starts if starts is None else starts
-        return self._map(lambda i: self._residual(plant, i, chosen[i]), range(len(self.pieces)))
+    def projections(self, plant: Plant, initial_states: Sequence[Array]) -> list[Projection]:
+        """Eliminate the initial states around those given."""
+        return self._map(lambda i: self._projection(plant, i, initial_states[i]), range(len(self.segments)))
 
-    def linearise(self, values: Mapping[str, float]) -> list[Linear]:
-        """Eliminate the initial states around the present ones."""
-        plant = self.plant.with_parameters(dict(values))
-        return self._map(lambda i: self._linearise(plant, i), range(len(self.pieces)))
+    def settled(self, plant: Plant, initial_states: Sequence[Array]) -> tuple[list[Array], list[Projection]]:
+        """Initial states where the residual is smallest, to first order, and what is left there.
 
-    def settle(self, values: Mapping[str, float]) -> list[Linear]:
-        """Move every start to where its residual is smallest, to first order, and say what is left there.
-
-        The directions in which the starts act are those before the move; they hardly change with it. A start that
+        The directions in which they act are those before the move; they hardly change with it. An initial state that
         the move makes worse stays where it was.
         """
-        linear = self.linearise(values)
-        before = [s.copy() for s in self.starts]
-        for i, lin in enumerate(linear):
-            self.starts[i][:, self.pieces[i].free] += (lin.back @ lin.raw[..., None])[..., 0]
-        settled = []
-        for i, (raw, lin) in enumerate(zip(self.residuals(values), linear, strict=True)):
-            worse = np.sum(raw**2, axis=1) > np.sum(lin.raw**2, axis=1)
-            self.starts[i][worse] = before[i][worse]
-            settled.append(Linear(np.where(worse[:, None], lin.raw, raw), lin.basis, lin.back))
-        return settled
+        before = self.projections(plant, initial_states)
+        moved = self.corrected(initial_states, before, [p.raw for p in before])
+        states, projections = [], []
+        for old, new, raw, p in zip(initial_states, moved, self.residuals(plant, moved), before, strict=True):
+            better = (np.sum(raw**2, axis=1) <= np.sum(p.raw**2, axis=1))[:, None]
+            states.append(np.where(better, new, old))
+            projections.append(Projection(np.where(better, raw, p.raw), p.basis, p.correction))
+        return states, projections
 
-    def jacobian(self, values: Mapping[str, float], scales: Mapping[str, float], base: Sequence[Array]) -> list[Array]:
-        """d(residual)/d(parameter/scale) per record (S, m, P), by one-sided differences that stay within bounds."""
-        keys = list(scales)
-        steps = {k: self._step(k, values[k], scales[k]) for k in keys}
-        jobs = [(k, i) for k in keys for i in range(len(self.pieces))]
-        plants = {k: self.plant.with_parameters({**values, k: values[k] + steps[k]}) for k in keys}
-        found = self._map(lambda job: self._residual(plants[job[0]], job[1], self.starts[job[1]]), jobs)
-        columns = dict(zip(jobs, found, strict=True))
-        return [
-            np.stack([(columns[k, i] - base[i]) * (scales[k] / steps[k]) for k in keys], axis=-1)
-            for i in range(len(self.pieces))
-        ]
+    def corrected(
+        self, initial_states: Sequence[Array], projections: Sequence[Projection], residuals: Sequence[Array]
+    ) -> list[Array]:
+        """Initial states moved to where these residuals (S, m) ask for, to first order."""
+        found = []
+        for segments, states, p, r in zip(self.segments, initial_states, projections, residuals, strict=True):
+            new = states.copy()
+            new[:, segments.free] += (p.correction @ r[..., None])[..., 0]
+            found.append(new)
+        return found
 
-    def _map(self, function: Callable, items) -> list:
-        return list(self._pool.map(function, items))
+    def jacobian(
+        self, plant: Plant, parameters: Parameters, initial_states: Sequence[Array], base: Sequence[Array]
+    ) -> list[Array]:
+        """d(residual)/d(parameter/scale) per record (S, m, P), by one-sided differences that stay within bounds.
 
-    def _step(self, key: str, value: float, scale: float) -> float:
-        high = self.plant.model.entry(key).bounds[1]  # type: ignore[index]
-        step = _STEP * scale
-        return step if value + step <= high else -step
+        ``plant`` has ``parameters``, and ``base`` are its residuals.
+        """
+        values, scales = parameters.values, parameters.scales
+        steps = _STEP * np.maximum(np.abs(values), _LEAST_STEP * scales)
+        steps = np.where(values + steps <= parameters.high, steps, -steps)
+        moved = zip(parameters.keys, (values + steps).tolist(), strict=True)
+        plants = [plant.with_parameters({key: value}) for key, value in moved]
+        jobs = [(p, i) for p in plants for i in range(len(self.segments))]
+        found = self._map(lambda job: self._residual(job[0], job[1], initial_states[job[1]]), jobs)
+        columns = [np.empty((*r.shape, len(parameters))) for r in base]
+        for number, residual in enumerate(found):
+            k, i = divmod(number, len(self.segments))
+            columns[i][..., k] = (residual - base[i]) * (scales[k] / steps[k])
+        return columns
+
+    def _map(self, function: Callable[..., T], items: Iterable) -> list[T]:
+        return list(_workers(os.cpu_count() or 1).map(function, items))
 
     def _residual(self, plant: Plant, i: int, states: Array) -> Array:
-        pieces = self.pieces[i]
-        run = self._run(plant, pieces, states)
-        simulated = np.stack([run[c] for c in pieces.channels], axis=-1) / pieces.noise
-        off = (pieces.states[:, pieces.free] - states[:, pieces.free]) / pieces.prior
-        off = np.where(self._unseen[i], self.misfit * off, off)
-        return np.concatenate(((pieces.measured - simulated).reshape(len(pieces.starts), -1), off), axis=1)
+        segments = self.segments[i]
+        run = self._run(plant, segments, states)
+        simulated = np.stack([run[c] for c in segments.channels], axis=-1) / segments.noise_std
+        off = (segments.initial_states - states)[:, segments.free] / segments.prior_std
+        off = np.where(segments.unmeasured_pressures, self.misfit * off, off)
+        return np.concatenate(((segments.measured - simulated).reshape(len(segments), -1), off), axis=1)
 
-    def _run(self, plant: Plant, pieces: Pieces, states: Array) -> dict[str, Array]:
-        """The pieces simulated; states that no sensor sees follow the record up to each start."""
-        drive, dt, memories = pieces.record["drive"], pieces.record.dt, None
+    def _run(self, plant: Plant, segments: Segments, states: Array) -> dict[str, Array]:
+        """The segments simulated; states that no sensor sees are propagated along the record up to each segment."""
+        drive, dt, memories = segments.record["drive"], segments.record.dt, None
         if plant.has_inner_states:
-            tracked, memories = plant.track(drive, dt, pieces.starts, pieces.seen)
-            inner = [i for i, name in enumerate(plant.state_names) if i >= pieces.seen.shape[1] and name != "stick"]
+            tracked, memories = plant.track(drive, dt, segments.first, segments.smoothed)
+            measured = segments.smoothed.shape[1]
+            inner = [i for i, name in enumerate(plant.state_names) if i >= measured and name != "stick"]
             states = states.copy()
             states[:, inner] = tracked[:, inner]
-        return plant.predict(drive, dt, pieces.starts, pieces.samples - 1, states, memories)
+        return plant.predict(drive, dt, segments.first, segments.samples - 1, states, memories)
 
-    def _linearise(self, plant: Plant, i: int) -> Linear:
-        pieces, states = self.pieces[i], self.starts[i]
+    def _projection(self, plant: Plant, i: int, states: Array) -> Projection:
+        segments = self.segments[i]
         base = self._residual(plant, i, states)
-        columns = []
-        for index, name in ((k, self.plant.state_names[k]) for k in pieces.free):
+        jacobian = np.empty((*base.shape, len(segments.free)))
+        for place, index in enumerate(segments.free):
+            name = plant.state_names[index]
             if name == "velocity":
                 step = _VELOCITY_STEP
-            elif name in pieces.channels:
-                step = _STATE_STEP * pieces.noise[pieces.channels.index(name)]
+            elif name in segments.channels:
+                step = _STATE_STEP * float(segments.noise_std[segments.channels.index(name)])
             else:
                 step = _PRESSURE_STEP
             moved = states.copy()
             moved[:, index] += step
-            columns.append((self._residual(plant, i, moved) - base) / step)
-        jacobian = np.stack(columns, axis=-1)
-        basis, triangle = np.linalg.qr(jacobian)
-        back = -np.linalg.solve(triangle, basis.transpose(0, 2, 1))
-        return Linear(base, basis, back)
+            jacobian[..., place] = (self._residual(plant, i, moved) - base) / step
+        return Projection.of(base, jacobian)
 
 
 @lru_cache(maxsize=4)
 def _workers(number: int) -> ThreadPoolExecutor:
     """The threads that all shootings of a process share; simulation holds no lock."""
     return ThreadPoolExecutor(number)
-
-
-def _unseen(plant: Plant, pieces: Pieces) -> NDArray[np.bool_]:
-    """(F,) which of the estimated states are pressures without a sensor."""
-    names = [plant.state_names[k] for k in pieces.free]
-    return np.array([n.startswith("pressure") and n not in pieces.channels for n in names])

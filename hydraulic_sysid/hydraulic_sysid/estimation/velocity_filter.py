@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_coeffs, savgol_filter
 
-Array = NDArray[np.float64]
+from hydraulic_sim.arrays import Array
 
 SPANS = (0.008, 0.012, 0.016, 0.02, 0.025, 0.03, 0.04, 0.05, 0.065, 0.08)
 """Lengths in seconds that the derivative filter may have."""

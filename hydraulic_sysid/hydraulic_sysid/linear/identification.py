@@ -14,7 +14,7 @@ from hydraulic_sysid.data.records import Record, RecordError
 from hydraulic_sysid.data.resampling import held_average, sampled
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.estimation import metrics
-from hydraulic_sysid.estimation.noise import noise_floor
+from hydraulic_sysid.estimation.noise import noise_std
 
 from .models import (
     CRITERIA,
@@ -185,7 +185,7 @@ def _figures(model: LinearModel, series: _Series, output: str) -> dict[str, Any]
         "source": str(series.record.source),
         "samples": series.y.size,
         "duration": series.y.size * model.dt,
-        "noise_std": noise_floor(series.record[output]),
+        "noise_std": noise_std(series.record[output]),
         **{f"{name}_free_run": _or_nan(merit, series.y, free) for name, merit in merits.items()},
         **{f"{name}_one_step": _or_nan(merit, y, ahead) for name, merit in merits.items()},
         "residual_tests": residual_tests(y - ahead, u) if np.isfinite(ahead).all() else None,

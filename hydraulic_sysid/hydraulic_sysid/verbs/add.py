@@ -9,7 +9,7 @@ import argparse
 from functools import partial
 
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sysid.diagnosis.calibrate import Settings
+from hydraulic_sysid.diagnosis.calibrate import FitSettings
 from hydraulic_sysid.diagnosis.search import add
 from hydraulic_sysid.verbs import _diagnosis_table
 from hydraulic_sysid.verbs import _options as opt
@@ -35,5 +35,5 @@ def _add(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     model = load_model(options.model)
     records = opt.read_records(options)
     held_out = opt.read_held_out(options.holdout, options)
-    done = add(model, options.effect, records, held_out, Settings(length=options.piece), say)
+    done = add(model, options.effect, records, held_out, FitSettings(length=options.piece), say)
     return opt.Done(done.result, {opt.MODEL: partial(save_model, done.model)}, done.confirmed)

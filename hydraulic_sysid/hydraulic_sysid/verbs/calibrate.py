@@ -16,7 +16,7 @@ from rich.console import Console
 
 from hydraulic_node_utils import tables
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sysid.diagnosis.calibrate import Settings, calibrate
+from hydraulic_sysid.diagnosis.calibrate import FitSettings, calibrate
 from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
@@ -45,7 +45,7 @@ def _calibrate(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     model = load_model(options.model)
     records = opt.read_records(options)
     held_out = opt.read_held_out(options.holdout_record, options)
-    settings = Settings(length=options.piece, robust=options.robust)
+    settings = FitSettings(length=options.piece, robust=options.robust)
     done = calibrate(model, records, held_out, settings, options.free, lambda text: say(f"calibrating: {text}"))
     return opt.Done(done.result, {opt.MODEL: partial(save_model, done.model)}, done.result["converged"])
 

@@ -12,7 +12,7 @@ import argparse
 from functools import partial
 
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sysid.diagnosis.calibrate import Settings
+from hydraulic_sysid.diagnosis.calibrate import FitSettings
 from hydraulic_sysid.diagnosis.search import diagnose
 from hydraulic_sysid.verbs import _diagnosis_table
 from hydraulic_sysid.verbs import _options as opt
@@ -40,11 +40,11 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     model = load_model(options.model)
     records = opt.read_records(options)
     held_out = opt.read_held_out(options.holdout, options)
-    done = diagnose(model, records, held_out, Settings(length=options.piece), say)
+    done = diagnose(model, records, held_out, FitSettings(length=options.piece), say)
     verdict = done.result["verdict"]
     models = {opt.MODEL: done.model} if options.apply else {}
-    models |= {f"competing_{name}.yaml": rival for name, rival in done.rivals.items()}
-    if done.rivals:
-        models |= {f"competing_{name}.yaml": done.model for name in verdict["effects"] if name not in done.rivals}
+    models |= {f"competing_{name}.yaml": other for name, other in done.alternatives.items()}
+    if done.alternatives:
+        models |= {f"competing_{name}.yaml": done.model for name in verdict["effects"] if name not in done.alternatives}
     files = {name: partial(save_model, one) for name, one in models.items()}
     return opt.Done(done.result, files, verdict["kind"] in ("missing", "complete"))

@@ -18,7 +18,7 @@ from hydraulic_node_utils import tables
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.display import number, span
 from hydraulic_sysid.diagnosis.next_experiment import NextExperimentError, competing, limits_of, next_experiment
-from hydraulic_sysid.estimation.noise import noise_floor
+from hydraulic_sysid.estimation.noise import noise_std
 from hydraulic_sysid.estimation.segments import MEASURED
 from hydraulic_sysid.verbs import _options as opt
 
@@ -63,10 +63,10 @@ def _design(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     models = competing.of_diagnosis(file.parent, diagnosis) if diagnosis else competing.of_files(options.model)
     noise = _noise(options, diagnosis)
     limits = replace(limits_of(models, options.centre), **opt.given_limits(options))
-    piece = options.piece or float(diagnosis.get("settings", {}).get("segment_length", 0.5))
+    length = options.piece or float(diagnosis.get("settings", {}).get("segment_length", 0.5))
     proposal = next_experiment(
         models, limits, noise, options.seconds, lambda text: say(f"designing: {text}"),
-        centre=options.centre, rate=options.rate, piece=piece,
+        centre=options.centre, rate=options.rate, segment_length=length,
     )  # fmt: skip
     result = {**proposal.document, "file": str(options.out / PLAN)}
     return opt.Done(result, {PLAN: lambda file: proposal.save(file.parent)}, result["verdict"]["level"] != "off")
@@ -86,7 +86,7 @@ def _noise(options: argparse.Namespace, diagnosis: dict[str, Any]) -> dict[str, 
     if options.record:
         records = opt.read_records(options)
         channels = [c for c in MEASURED if all(c in r for r in records)]
-        return {c: statistics.median(noise_floor(r[c]) for r in records) for c in channels}
+        return {c: statistics.median(noise_std(r[c]) for r in records) for c in channels}
     if diagnosis:
         return {c: statistics.median(by_record.values()) for c, by_record in diagnosis["noise_std"].items()}
     raise NextExperimentError("which channels are measured, and how noisy? Name a --record, or --noise CHANNEL=SIGMA …")

@@ -13,8 +13,9 @@ import numpy as np
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
-from hydraulic_sysid.estimation.estimate import CalibrationError, Fit, Settings, evaluate, fit, loss
-from hydraulic_sysid.estimation.uncertainty import BLIND, at_bounds, uncertainty
+from hydraulic_sysid.estimation.errors import CalibrationError
+from hydraulic_sysid.estimation.fit import Fit, FitSettings, evaluate, fit, loss
+from hydraulic_sysid.estimation.uncertainty import VAGUE, uncertainty
 
 _WIDTH = 1.96  # standard errors on either side of a 95 % interval
 EXACT = 1.1  # residual over noise up to which a model is said to explain its records
@@ -31,17 +32,20 @@ class Calibration:
 def calibrate(
     model: Model,
     records: Sequence[Record],
-    held_out: Sequence[Record] = (),
-    settings: Settings | None = None,
+    test: Sequence[Record] = (),
+    settings: FitSettings | None = None,
     keys: Sequence[str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
-    """Fit ``keys`` (default: the model's free parameters) to ``records``; try the result on ``held_out``.
+    """Fit ``keys`` (default: the model's free parameters) to ``records``; try the result on ``test`` records.
 
-    Held-out records are never seen by the fit. Raises `CalibrationError`, `hydraulic_sim.errors.ModelError` for an
-    unknown key, and `hydraulic_sim.errors.SimulationError`.
+    The fit never sees test records.
+
+    :raises CalibrationError: nothing to fit, unusable records, or such as are in both roles.
+    :raises hydraulic_sim.errors.ModelError: a model that does not compose.
+    :raises hydraulic_sim.errors.SimulationError: the model does not run along a record.
     """
-    settings = settings or Settings()
+    settings = settings or FitSettings()
     chosen = list(dict.fromkeys(model.free_keys() if keys is None else keys))
     in_use = model.keys()
     unknown = [k for k in chosen if k not in in_use]
@@ -49,17 +53,15 @@ def calibrate(
         raise CalibrationError(f"{', '.join(unknown)}: not in the model; it has: {', '.join(in_use)}")
     if not chosen:
         raise CalibrationError("nothing to fit: no parameter is free (mark one `fit: free` in the model file)")
-    same = [h.name for h in held_out if any(_shares_samples(h, r) for r in records)]
+    same = [t.name for t in test if any(_shares_samples(t, r) for r in records)]
     if same:
         raise CalibrationError(f"test records are also among those to fit: {', '.join(same)}")
     say = progress or (lambda _: None)
     say("residuals before")
     before = evaluate(model, records, settings)
-    held_before = evaluate(model, held_out, settings) if held_out else None
+    test_before = evaluate(model, test, settings) if test else None
     done = fit(model, records, chosen, settings, lambda i, rms: say(f"step {i}: residual {rms:.3g} times the noise"))
-    bounds = {k: model.entry(k).bounds for k in chosen}
-    known = uncertainty(done)
-    stuck = at_bounds(done, bounds)  # type: ignore[arg-type]
+    known, fitted = uncertainty(done), done.point.parameters
     calibrated = model.with_values(done.values, source="calibrated")
     for key, error in known.standard_errors.items():
         calibrated = calibrated.with_entry(key, standard_error=error if math.isfinite(error) else None)
@@ -67,39 +69,41 @@ def calibrate(
         date=date.today().isoformat(),
         change="calibrated " + ", ".join(chosen),
         records=[r.name for r in records],
-        test_records=[r.name for r in held_out],
+        test_records=[r.name for r in test],
         error_before=float(f"{before.rms:.4g}"),
         error_after=float(f"{done.rms:.4g}"),
         error_unit="residual over noise",
     )
-    held_after = evaluate(calibrated, held_out, settings) if held_out else None
+    test_after = evaluate(calibrated, test, settings) if test else None
     result = {
         **heading("calibrate", 2),
         "model": {"name": model.name, "path": None if model.path is None else str(model.path)},
         "settings": {"segment_length": settings.length, "robust": settings.robust},
-        "records": [_about(r, "fit") for r in records] + [_about(r, "test") for r in held_out],
+        "records": [_about(r, "fit") for r in records] + [_about(r, "test") for r in test],
         "converged": done.converged,
-        "iterations": done.steps,
+        "iterations": done.iterations,
         "fit": _residuals(before, done),
-        "test": None if held_before is None or held_after is None else _residuals(held_before, held_after),
+        "test": None if test_before is None or test_after is None else _residuals(test_before, test_after),
         "parameters": [
             {
                 "key": key,
                 "unit": model.parameter(key).unit,
                 "before": model.value(key),
-                "value": float(done.values[key]),
+                "value": value,
                 "standard_error": known.standard_errors[key],
-                "interval": _interval(done.values[key], known.standard_errors[key]),
-                "scale": done.scales[key],
-                "bounds": list(bounds[key]),  # type: ignore[arg-type]
-                "at_bound": stuck.get(key),
-                "identifiable": known.standard_errors[key] < BLIND * done.scales[key],
+                "interval": _interval(value, known.standard_errors[key]),
+                "scale": scale,
+                "bounds": [low, high],
+                "at_bound": fitted.at_bound.get(key),
+                "identifiable": known.standard_errors[key] < VAGUE * scale,
             }
-            for key in chosen
+            for key, value, scale, low, high in zip(
+                fitted.keys, *(a.tolist() for a in (fitted.values, fitted.scales, fitted.low, fitted.high)), strict=True
+            )
         ],
         "correlation": {"keys": chosen, "matrix": known.correlation.tolist()},
-        "condition_number": known.condition,
-        "not_identifiable": [{"weights": d.weights, "error": d.error} for d in known.blind],
+        "condition_number": known.condition_number,
+        "not_identifiable": [{"weights": d.weights, "error": d.error} for d in known.not_identifiable],
     }
     result["verdict"] = _verdict(result)
     return Calibration(calibrated, result)
@@ -134,20 +138,20 @@ def _span(record: Record) -> tuple[float, float]:
 
 
 def _interval(value: float, error: float) -> list[float]:
-    """The 95 % interval, infinite where the data do not tell the parameter."""
+    """The 95 % interval, infinite where the data do not determine the parameter."""
     return [float(value - _WIDTH * error), float(value + _WIDTH * error)]
 
 
 def _residuals(before: Fit, after: Fit) -> dict[str, Any]:
-    """Residual over noise, before and after: over all, and per record and channel with the noise floor beside it."""
+    """Residual over noise, before and after: over all, and per record and channel with the noise beside it."""
     rows = []
-    for old, new, pieces in zip(_by_channel(before), _by_channel(after), after.shooting.pieces, strict=True):
-        for c, channel in enumerate(pieces.channels):
+    for old, new, segments in zip(_by_channel(before), _by_channel(after), after.point.shooting.segments, strict=True):
+        for c, channel in enumerate(segments.channels):
             rows.append(
                 {
-                    "record": pieces.record.name,
+                    "record": segments.record.name,
                     "channel": channel,
-                    "noise_std": float(pieces.noise[c]),
+                    "noise_std": float(segments.noise_std[c]),
                     "before": float(old[c]),
                     "after": float(new[c]),
                 }
@@ -156,19 +160,17 @@ def _residuals(before: Fit, after: Fit) -> dict[str, Any]:
 
 
 def _by_channel(fitted: Fit) -> list[np.ndarray]:
-    """Residual over noise per channel (C,), one array per record, the starts' degrees of freedom taken out."""
+    """Residual over noise per channel (C,), one array per record, the initial states' degrees of freedom taken out."""
     found = []
-    for pieces, residual in zip(fitted.shooting.pieces, fitted.residuals, strict=True):
-        free = len(pieces.free)
-        counted = loss(residual[:, :-free], fitted.settings)
-        squares = counted.reshape(len(pieces.starts), pieces.samples, len(pieces.channels))
-        used = len(pieces.starts) * free / squares.size
+    for segments, projection in zip(fitted.point.shooting.segments, fitted.point.projections, strict=True):
+        squares = loss(segments.by_channel(projection.residual), fitted.point.robust)
+        used = len(segments) * segments.free.size / squares.size
         found.append(np.sqrt(squares.mean(axis=(0, 1)) / (1.0 - used)))
     return found
 
 
 def _verdict(result: dict[str, Any]) -> dict[str, str]:
-    """One sentence: how far the error fell, where it stands, and what the data do not tell."""
+    """One sentence: how far the error fell, where it stands, and what the data cannot identify."""
     judged = result["test"] or result["fit"]
     where = "test records" if result["test"] else "the records fitted (there were no test records)"
     level = "explained" if judged["after"] <= EXACT else "off"

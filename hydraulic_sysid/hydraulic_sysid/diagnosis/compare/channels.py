@@ -15,7 +15,7 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.model_file import Model
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.estimation.noise import noise_floor
+from hydraulic_sysid.estimation.noise import noise_std
 from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
 
 UNITS = {
@@ -73,4 +73,4 @@ def measured(record: Record, model: Model, to_velocity: VelocityFilter | None = 
 
 
 def _noise(values: Array) -> float:
-    return max(noise_floor(values), _NUMERICAL * float(np.abs(values).max()))
+    return max(noise_std(values), _NUMERICAL * float(np.abs(values).max()))

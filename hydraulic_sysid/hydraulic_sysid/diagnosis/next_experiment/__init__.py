@@ -1,7 +1,7 @@
-"""The next experiment: the excitation on which rival models disagree most, each refitted as well as it can be.
+"""The next experiment: the excitation on which competing models disagree most, each refitted as well as it can be.
 
 `movements` lists what an experiment may be made of, `reference` turns movements into a drive, `evidence` says how
-much each would tell, `search` finds the best sequence, `verify` plays it on every rival and refits them,
+much each would show, `movement_search` finds the best sequence, `verify` plays it on every model and refits them,
 `plan_file` writes it for the excitation node, `document` gathers the figures.
 """
 

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.decimation import trace
@@ -16,12 +15,10 @@ from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.simulated_run import SimulatedRun
 
+from .movement_search import JudgedMovement, MovementSearch
 from .movements import FAMILIES
 from .reference import MARGIN, Played
-from .search import Candidate, Search
-from .verify import Refit
-
-Array = NDArray[np.float64]
+from .verify import CrossFit
 
 CLEAR = 5.0  # mean over standard deviation of the difference of two sums of squares, from which noise cannot decide
 _FAINT = 2.0
@@ -33,18 +30,18 @@ _POINTS = 1000
 class Design:
     """All that a document is made of."""
 
-    rivals: Mapping[str, Model]
-    search: Search
-    candidates: Sequence[Candidate]
-    chosen: Sequence[Candidate]
+    models: Mapping[str, Model]
+    search: MovementSearch
+    candidates: Sequence[JudgedMovement]
+    chosen: Sequence[JudgedMovement]
     played: Played
     plan: Plan
     seen: Sequence[SimulatedRun]
     limited_by: str
-    refits: Sequence[Refit]
+    refits: Sequence[CrossFit]
 
     def name(self, point: int) -> str:
-        return self.search.points[point].rival
+        return self.search.points[point].name
 
 
 def document(design: Design) -> dict[str, Any]:
@@ -54,11 +51,11 @@ def document(design: Design) -> dict[str, Any]:
     return {
         **heading("next_experiment", 2),
         "verdict": _verdict(design),
-        "title": f"Next experiment: {_or(list(design.rivals))}?",
+        "title": f"Next experiment: {_or(list(design.models))}?",
         "competing_models": [
             {"name": name, "model": model.name, "path": None if model.path is None else str(model.path),
-             "effects": list(model.effects), "fitted": search.points[i].keys}
-            for i, (name, model) in enumerate(design.rivals.items())
+             "effects": list(model.effects), "fitted": list(search.points[i].parameters.keys)}
+            for i, (name, model) in enumerate(design.models.items())
         ],
         "settings": {
             "seconds": plan.active_time, "rate": search.bench.rate, "centre": search.bench.centre,
@@ -79,7 +76,7 @@ def document(design: Design) -> dict[str, Any]:
         "traces": {
             "drive": _traced(design.seen[0], "drive"),
             **{
-                c: {name: _traced(s, c) for name, s in zip(design.rivals, design.seen, strict=True)}
+                c: {name: _traced(s, c) for name, s in zip(design.models, design.seen, strict=True)}
                 for c in _SHOWN
                 if search.points[0].model.kind == "hydraulic" or not c.startswith("pressure")
             },
@@ -87,8 +84,8 @@ def document(design: Design) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _pair(design: Design, refit: Refit) -> dict[str, Any]:
-    """One rival refitted to what another does."""
+def _pair(design: Design, refit: CrossFit) -> dict[str, Any]:
+    """One model refitted to what another does."""
     t, r = refit.pair
     model = design.search.points[r].model
     since = design.plan.signal_start
@@ -97,11 +94,11 @@ def _pair(design: Design, refit: Refit) -> dict[str, Any]:
         "refitted": design.name(r),
         "chi_square": refit.left,
         "separation": refit.separation,
-        "misclassification_probability": refit.mistaken,
+        "misclassification_probability": refit.misclassification,
         "seconds_needed": _seconds(design, refit),
         "rms": float(np.sqrt(np.mean(refit.series**2))),
         "converged": refit.converged,
-        "channel_shares": refit.shares,
+        "channel_shares": refit.channel_shares,
         "parameters": [
             {"key": k, "unit": model.parameter(k).unit, "before": model.value(k), "after": v}
             for k, v in refit.values.items()
@@ -115,7 +112,7 @@ def _pair(design: Design, refit: Refit) -> dict[str, Any]:
 def _compared(design: Design) -> list[dict[str, Any]]:
     """The best of every kind of movement, repeated over the same time: the least separation of all pairs, best first.
 
-    By the sensitivities at the rivals' parameters; ``chosen`` is the sequence by the same measure.
+    By the sensitivities at the models' parameters; ``chosen`` is the sequence by the same measure.
     """
     places, points = len(design.chosen), design.search.points
     sequence = design.chosen[0].evidence
@@ -144,7 +141,7 @@ def _least(design: Design, left: Mapping[tuple[int, int], float], times: int) ->
     }
 
 
-def _seconds(design: Design, refit: Refit) -> float:
+def _seconds(design: Design, refit: CrossFit) -> float:
     """How long the experiment must be repeated until the separation is clear [s]."""
     return design.plan.active_time * CLEAR**2 / refit.separation**2 if refit.separation > 0.0 else float("inf")
 
@@ -155,21 +152,21 @@ def _verdict(design: Design) -> dict[str, str]:
     seconds = design.plan.active_time
     last = (
         f"the closest two are {t} (true) and {r} (refitted)"
-        if len(design.rivals) > 2
+        if len(design.models) > 2
         else (f"the harder way round is {r} refitted to {t}")
     )
     level = "explained" if worst.separation >= CLEAR else "close" if worst.separation >= _FAINT else "off"
     apart = f"{number(worst.separation)} standard deviations of the noise apart after every refit ({last})"
     what = f"{number(seconds)} s of {_and(list(dict.fromkeys(c.movement.family.words for c in design.chosen)))}"
     if level == "explained":
-        text = f"{what} tell{'s' if ' and ' not in what else ''} {_and(list(design.rivals))} apart: {apart}."
+        text = f"{what} distinguish{'es' if ' and ' not in what else ''} {_and(list(design.models))}: {apart}."
     elif level == "close":
-        text = f"{what} hint at which of {_or(list(design.rivals))} it is: {apart}; about " + (
+        text = f"{what} hint at which of {_or(list(design.models))} it is: {apart}; about " + (
             f"{number(_seconds(design, worst))} s of it decide."
         )
     else:
         text = (
-            f"No experiment within the limits was found that tells {_or(list(design.rivals))} apart with these "
+            f"No experiment within the limits was found that distinguishes {_or(list(design.models))} with these "
             f"channels in {number(seconds)} s: at best they are {apart}."
         )
     return {"level": level, "text": text[:1].upper() + text[1:]}

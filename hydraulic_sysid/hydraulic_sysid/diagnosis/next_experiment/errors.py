@@ -4,4 +4,4 @@ from hydraulic_interfaces.errors import HydraulicError
 
 
 class NextExperimentError(HydraulicError):
-    """The rivals cannot be compared, or no movement keeps the limits; the message says why."""
+    """The models cannot be compared, or no movement keeps the limits; the message says why."""

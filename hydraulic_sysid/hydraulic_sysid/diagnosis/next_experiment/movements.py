@@ -12,13 +12,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.signals.odd_random_phase_multisine import OddRandomPhaseMultisine
 from hydraulic_sysid.excitation.signals.steps import Steps
 from hydraulic_sysid.excitation.signals.triangle import Triangle
-
-Array = NDArray[np.float64]
 
 _ALIKE = 0.03  # relative difference of numbers below which movements are the same
 _BACK = 0.2  # of a movement's time, in which the piston returns to where it began

@@ -6,7 +6,6 @@ from io import StringIO
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 from hydraulic_sysid.data.results import write_text
@@ -16,8 +15,6 @@ from hydraulic_sysid.excitation.signals.playback import Playback
 
 from .errors import NextExperimentError
 from .reference import Played
-
-Array = NDArray[np.float64]
 
 NAME = "next_experiment"
 TRACKING = 0.08  # of the drive, for what keeps the piston near its predicted way

@@ -1,4 +1,4 @@
-"""Design the experiment on which rival models disagree most, after each has been refitted as well as it can."""
+"""Design the experiment on which competing models disagree most, after each has been refitted as well as it can."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from . import plan_file
 from .document import CLEAR, Design, document
 from .errors import NextExperimentError
 from .evidence import Point
+from .movement_search import JudgedMovement, MovementSearch
 from .movements import Bench, Movement
 from .reference import Leader, Played, play
-from .search import Candidate, Search
-from .verify import Refit, refits, simulated_runs
+from .verify import CrossFit, refits, simulated_runs
 
 _MOVEMENT_S = 5.0  # about the time of one movement
 _MOST_MOVEMENTS = 6
@@ -32,7 +32,7 @@ _SHORTEST_S, _LONGEST_S = 2.0, 600.0
 _ROUNDS = 2  # of the search, each at what the refits of the one before ended at
 _OPTIMISTIC = 0.5  # of what the sensitivities promise: below, the refits are searched around as well
 _PLENTY = 2.0  # times what is clear, from which on nothing better is searched for
-_MOST_REFITS = 8  # pairs of rivals, the closest ones
+_MOST_REFITS = 8  # pairs of models, the closest ones
 _SMALLER = 8  # attempts to bring the whole within the limits
 
 Say = Callable[[str], None]
@@ -53,14 +53,14 @@ class Proposal:
 
 @dataclass(frozen=True)
 class _Tried:
-    """A sequence of movements, played on and fitted by every rival."""
+    """A sequence of movements, played on and fitted by every model."""
 
-    chosen: list[Candidate]
+    chosen: list[JudgedMovement]
     played: Played
     plan: Plan
     seen: list[SimulatedRun]
     limited_by: str
-    refits: list[Refit]
+    refits: list[CrossFit]
 
     @property
     def separation(self) -> float:
@@ -68,9 +68,9 @@ class _Tried:
         return min(r.separation for r in self.refits)
 
 
-def limits_of(rivals: Mapping[str, Model], centre: float = 0.0) -> Limits:
-    """The tightest limits of all rivals (see `Limits.of`)."""
-    every = [Limits.of(model, centre) for model in rivals.values()]
+def limits_of(models: Mapping[str, Model], centre: float = 0.0) -> Limits:
+    """The tightest limits of all models (see `Limits.of`)."""
+    every = [Limits.of(model, centre) for model in models.values()]
     return Limits(
         drive=min(one.drive for one in every),
         travel=min(one.travel for one in every),
@@ -81,7 +81,7 @@ def limits_of(rivals: Mapping[str, Model], centre: float = 0.0) -> Limits:
 
 
 def next_experiment(
-    rivals: Mapping[str, Model],
+    models: Mapping[str, Model],
     limits: Limits,
     noise: Mapping[str, float],
     seconds: float = 20.0,
@@ -89,36 +89,36 @@ def next_experiment(
     *,
     centre: float = 0.0,
     rate: float = 1000.0,
-    piece: float = 0.5,
+    segment_length: float = 0.5,
 ) -> Proposal:
-    """The experiment of about ``seconds`` that tells ``rivals`` (name → fitted model) apart best.
+    """The experiment of about ``seconds`` that best distinguishes ``models`` (name → fitted model).
 
-    It is made of movements (`movements.FAMILIES`), each of which is tried on every rival; those are taken that leave
-    most between the two closest rivals after a refit (see `evidence`). ``limits`` are kept by every rival with a tenth
+    It is made of movements (`movements.FAMILIES`), each of which is tried on every model; those are taken that leave
+    most between the two closest models after a refit (see `evidence`). ``limits`` are kept by every model with a tenth
     to spare; ``noise``: standard deviation of each measured channel [m, Pa]; ``centre`` [m]: where the piston starts;
-    ``rate`` [Hz]; ``piece`` [s]: length of the pieces that the rivals are fitted in afterwards.
+    ``rate`` [Hz]; ``segment_length`` [s]: of the segments in which the models are fitted afterwards.
 
-    Raises `NextExperimentError`: fewer than two rivals, no movement within the limits, values that make no sense.
+    Raises `NextExperimentError`: fewer than two models, no movement within the limits, values that make no sense.
     """
-    _check(rivals, noise, seconds)
+    _check(models, noise, seconds)
     say = progress or (lambda _: None)
     places = min(max(1, round(seconds / _MOVEMENT_S)), _MOST_MOVEMENTS)
     time = round(seconds / places * rate) / rate
     bench = Bench((1.0 - plan_file.TRACKING) * limits.drive, limits.travel, centre, time, rate)
-    points = [Point(name, model) for name, model in rivals.items()]
+    points = [Point(name, model) for name, model in models.items()]
     first, best = len(points), None
-    found: list[Candidate] = []
+    found: list[JudgedMovement] = []
     for number in range(_ROUNDS):
-        search = Search(points, first, limits, noise, bench, piece)
+        search = MovementSearch(points, first, limits, noise, bench, segment_length)
         found = search.again(found, say) if found else search.candidates(say)
         chosen = search.refined(search.best(found, places), say)
-        say("playing it on every rival")
+        say("playing it on every model")
         tried = _try(search, chosen, say)
         if best is None or tried.separation > best[0].separation:
             best = (tried, search, found)
         promised = _total(chosen).left(points)
         further = [
-            Point(points[r.pair[1]].rival, points[r.pair[1]].model.with_values(r.values))
+            Point(points[r.pair[1]].name, points[r.pair[1]].model.with_values(r.values))
             for r in tried.refits
             if r.left < _OPTIMISTIC * promised[r.pair]
         ]
@@ -126,15 +126,15 @@ def next_experiment(
             break
         points = [*points, *further]
     tried, search, found = best  # type: ignore[misc]
-    plan = replace(tried.plan, prediction=_over_all(tried, list(rivals)))
-    design = Design(rivals, search, found, tried.chosen, tried.played, plan, tried.seen, tried.limited_by, tried.refits)
+    plan = replace(tried.plan, prediction=_over_all(tried, list(models)))
+    design = Design(models, search, found, tried.chosen, tried.played, plan, tried.seen, tried.limited_by, tried.refits)
     return Proposal(plan, document(design))
 
 
-def _try(search: Search, chosen: list[Candidate], say: Say) -> _Tried:
-    """The sequence as a plan that every rival can play within the limits, smaller where needed, and all refits."""
+def _try(search: MovementSearch, chosen: list[JudgedMovement], say: Say) -> _Tried:
+    """The sequence as a plan that every model can play within the limits, smaller where needed, and all refits."""
     lead, bench = search.points[0], search.bench
-    rivals = search.points[: search.first]
+    models = search.points[: search.first]
     leader = Leader.of(lead.model)
     movements: list[Movement] = [c.movement for c in chosen]
     part, limit, reason = 0.0, "", ""
@@ -143,7 +143,7 @@ def _try(search: Search, chosen: list[Candidate], say: Say) -> _Tried:
             try:
                 played = play(lead.plant, leader, movements, bench)
                 plan = plan_file.make(played, search.limits, bench.centre, bench.rate, Path(folder), _words(movements))
-                seen, part, limit = simulated_runs(plan, rivals, search.limits, bench.centre)
+                seen, part, limit = simulated_runs(plan, models, search.limits, bench.centre)
             except SimulationError:
                 part, limit = 2.0, "the model"
             if part <= 1.0:
@@ -152,7 +152,7 @@ def _try(search: Search, chosen: list[Candidate], say: Say) -> _Tried:
             reason = limit
         else:
             raise NextExperimentError(f"the movements one after the other keep no limits: {limit} breaks")
-    say("refitting every rival to every other")
+    say("refitting every model to every other")
     promised = _total(chosen).left(search.points)
     original = sorted((p for p in search.pairs if p[1] < search.first), key=lambda p: promised[p])[:_MOST_REFITS]
     done = refits(search.points, original, seen, plan, search.noise, search.length)
@@ -160,12 +160,12 @@ def _try(search: Search, chosen: list[Candidate], say: Say) -> _Tried:
     return _Tried(chosen, played, plan, seen, reason or _first(chosen), done)
 
 
-def _first(chosen: Sequence[Candidate]) -> str:
+def _first(chosen: Sequence[JudgedMovement]) -> str:
     """What made any of the movements smaller."""
     return ", ".join(dict.fromkeys(c.limited_by for c in chosen if c.limited_by))
 
 
-def _total(chosen: Sequence[Candidate]) -> Any:
+def _total(chosen: Sequence[JudgedMovement]) -> Any:
     total = chosen[0].evidence
     for other in chosen[1:]:
         total = total + other.evidence
@@ -173,7 +173,7 @@ def _total(chosen: Sequence[Candidate]) -> Any:
 
 
 def _over_all(tried: _Tried, names: Sequence[str]) -> Prediction:
-    """The extremes over all rivals."""
+    """The extremes over all models."""
     every = [s.extremes for s in tried.seen]
     return replace(
         every[0],
@@ -192,18 +192,18 @@ def _words(movements: Sequence[Movement]) -> str:
     return "; ".join(m.family.words for m in movements)
 
 
-def _check(rivals: Mapping[str, Model], noise: Mapping[str, float], seconds: float) -> None:
-    if len(rivals) < 2:
-        raise NextExperimentError(f"{len(rivals)} rival given; an experiment tells at least two apart")
-    kinds = {model.kind for model in rivals.values()}
+def _check(models: Mapping[str, Model], noise: Mapping[str, float], seconds: float) -> None:
+    if len(models) < 2:
+        raise NextExperimentError(f"{len(models)} model given; an experiment distinguishes at least two")
+    kinds = {model.kind for model in models.values()}
     if len(kinds) > 1:
-        raise NextExperimentError(f"the rivals are of different kinds of plant: {', '.join(sorted(kinds))}")
+        raise NextExperimentError(f"the models are of different kinds of plant: {', '.join(sorted(kinds))}")
     allowed = MEASURED if kinds == {"hydraulic"} else ("position",)
     if "position" not in noise:
         raise NextExperimentError(f"noise is given for {', '.join(noise) or 'nothing'}; the position's is needed")
     for channel, sigma in noise.items():
         if channel not in allowed:
-            raise NextExperimentError(f"noise of {channel!r}: rivals are compared by {', '.join(allowed)}")
+            raise NextExperimentError(f"noise of {channel!r}: models are compared by {', '.join(allowed)}")
         if not (math.isfinite(sigma) and sigma > 0.0):
             raise NextExperimentError(f"noise of {channel} is {sigma:g}; allowed: a positive standard deviation")
     if not _SHORTEST_S <= seconds <= _LONGEST_S:

@@ -1,4 +1,4 @@
-"""Movements become a drive: played on one of the rivals, which leads the piston where a movement wants it."""
+"""Movements become a drive: played on one of the models, which moves the piston where a movement wants it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.linear import operating_point
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant, PlantState, Trajectory
@@ -16,10 +16,8 @@ from hydraulic_sysid.excitation.prediction import Prediction
 
 from .movements import Bench, Movement
 
-Array = NDArray[np.float64]
-
 MARGIN = 0.9  # of the way to a limit that a prediction may use
-_WAY = 4.0  # rad/s, with which the piston is led to a position
+_WAY = 4.0  # rad/s, with which the piston is moved to a position
 _EVERY = 10e-3  # s between two looks at the piston on its way
 _RISE = 0.15  # s in which the drive on the way goes from nothing to all: the oil is not made to ring
 
@@ -46,7 +44,7 @@ class Leader:
 
 @dataclass(frozen=True)
 class Played:
-    """A drive (N,) [V], what the leading rival does under it, and where each movement begins (samples)."""
+    """A drive (N,) [V], what the leading model does under it, and where each movement begins (samples)."""
 
     drive: Array
     trajectory: Trajectory
@@ -71,7 +69,7 @@ def play(plant: Plant, leader: Leader, movements: Sequence[Movement], bench: Ben
             for drive in drives:
                 if phase.drive is None:
                     change = phase.most * drive.size * dt / _RISE
-                    wanted = _led(leader, state, phase.target, phase.most)
+                    wanted = _towards(leader, state, phase.target, phase.most)
                     drive[:] = min(max(wanted, last - change), last + change)
                 if drive.size:
                     state = plant.simulate(drive, dt, state).final
@@ -120,7 +118,7 @@ def _blocks(samples: int, block: int) -> list[int]:
     return [block] * (samples // block) + ([samples % block] if samples % block else [])
 
 
-def _led(leader: Leader, state: PlantState, target: float, most: float) -> float:
+def _towards(leader: Leader, state: PlantState, target: float, most: float) -> float:
     position, velocity = float(state.states[0]), float(state.states[1])
     drive = leader.distance * (target - position) - leader.speed * velocity
     return min(max(drive, -most), most)

@@ -1,4 +1,4 @@
-"""The designed experiment tried before anything moves: played on every rival, every rival refitted to every other."""
+"""The designed experiment tried before anything moves: played on every model, every model refitted to every other."""
 
 from __future__ import annotations
 
@@ -9,29 +9,27 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.estimation.estimate import Fit, Settings, fit_pieces
+from hydraulic_sysid.estimation.fit import Fit, FitSettings, fit_segments
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.amplitude import Limits
 from hydraulic_sysid.excitation.simulated_run import SimulatedRun, simulate_plan
 
-from .evidence import Pair, Point, pieces
+from .evidence import Pair, Point, segments
 from .reference import used
 
-Array = NDArray[np.float64]
-
-_MOST_STEPS = 12  # of a refit; what later ones gain is small beside what tells rivals apart
+_MOST_STEPS = 12  # of a refit; what later ones gain is small beside what distinguishes models
 
 
 @dataclass(frozen=True)
-class Refit:
-    """Rival ``pair[1]`` refitted to what rival ``pair[0]`` does.
+class CrossFit:
+    """Model ``pair[1]`` refitted to what model ``pair[0]`` does.
 
     ``left``: the sum of squares over the noise that no change of its parameters takes away, beyond what the true one
-    itself leaves (starts of pieces are read from a record and never quite exact); ``series`` (N, C): the difference
+    itself leaves (initial states are read from a record and never quite exact); ``series`` (N, C): the difference
     over the noise; ``values`` [SI]: the parameters it ended at.
     """
 
@@ -52,12 +50,12 @@ class Refit:
         return 0.5 * math.sqrt(self.left)
 
     @property
-    def mistaken(self) -> float:
+    def misclassification(self) -> float:
         """The probability that noise makes the wrong one fit better."""
         return float(norm.sf(self.separation))
 
     @property
-    def shares(self) -> dict[str, float]:
+    def channel_shares(self) -> dict[str, float]:
         """Which part of what is left lies in which channel."""
         squares = np.sum(self.series**2, axis=0)
         return dict(zip(self.channels, (squares / max(float(squares.sum()), 1e-300)).tolist(), strict=True))
@@ -66,7 +64,7 @@ class Refit:
 def simulated_runs(
     plan: Plan, points: Sequence[Point], limits: Limits, centre: float
 ) -> tuple[list[SimulatedRun], float, str]:
-    """The plan played on every rival by the code that plays it on the bench; the largest part of a limit that is used,
+    """The plan played on every model by the code that plays it on the bench; the largest part of a limit that is used,
     and of which. Raises `hydraulic_sim.errors.SimulationError`."""
     found, worst, limit = [], 0.0, ""
     for point in points:
@@ -89,29 +87,29 @@ def refits(
     plan: Plan,
     noise: Mapping[str, float],
     length: float,
-) -> list[Refit]:
+) -> list[CrossFit]:
     """Every pair of ``chosen``, the first of it by its simulated run in ``seen``. Raises as a calibration does."""
     records = [_played(s.record, plan, list(noise)) for s in seen]
 
     def fitted(number: int, record: Record, keys: Sequence[str]) -> Fit:
         point = points[number]
-        cut = pieces(record, point.plant, length, noise)
-        return fit_pieces(point.model, point.plant, [cut], keys, Settings(length=length, most_steps=_MOST_STEPS))
+        cuts = [segments(record, point.plant, length, noise)]
+        return fit_segments(point.plant, cuts, keys, FitSettings(length=length, most_steps=_MOST_STEPS))
 
     own = {t: fitted(t, records[t], ()).cost for t in {t for t, _ in chosen}}
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        done = list(pool.map(lambda pair: fitted(pair[1], records[pair[0]], points[pair[1]].keys), chosen))
+        done = list(pool.map(lambda pair: fitted(pair[1], records[pair[0]], points[pair[1]].parameters.keys), chosen))
     return [_refit(pair, fit, own[pair[0]], records[pair[0]]) for pair, fit in zip(chosen, done, strict=True)]
 
 
-def _refit(pair: Pair, done: Fit, own: float, record: Record) -> Refit:
-    cut = done.shooting.pieces[0]
-    residual = done.residuals[0][:, : -len(cut.free)].reshape(len(cut.starts), cut.samples, len(cut.channels))
-    index = cut.starts[:, None] + np.arange(cut.samples - 1)
-    return Refit(
+def _refit(pair: Pair, done: Fit, own: float, record: Record) -> CrossFit:
+    cut = done.point.shooting.segments[0]
+    residual = cut.by_channel(done.point.projections[0].residual)
+    index = cut.first[:, None] + np.arange(cut.samples - 1)
+    return CrossFit(
         pair,
         max(done.cost - own, 0.0),
-        {k: float(v) for k, v in done.values.items()},
+        done.values,
         done.converged,
         cut.channels,
         record.time[index.ravel()],

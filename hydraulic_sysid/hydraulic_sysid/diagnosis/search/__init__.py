@@ -1,11 +1,13 @@
 """From measurement to missing physics: which effect of the library a model lacks.
 
-`pieces` splits records, `anchor` fits and linearises a model, `screen` predicts what each candidate would gain,
-`chord` refits the best, `search` adds, leaves out and exchanges effects, `rivals` asks what else could be meant,
-`verdict` decides, `shape` draws what no effect explains, `document` gathers the figures.
+`holdout` splits records, `linearisation` is a fitted model with its sensitivities, `score_test` predicts what each
+candidate explains, `frozen_jacobian` refits the best, `search` adds, leaves out and exchanges effects,
+`competing_models` asks what else could be meant, `verdict` decides, `nonparametric_curves` draws what no effect
+explains, `document` gathers the figures.
 """
 
 from .addition import Addition, add
-from .diagnosis import Diagnosis, DiagnosisError, diagnose
+from .diagnosis import Diagnosis, diagnose
+from .errors import DiagnosisError
 
 __all__ = ["Addition", "Diagnosis", "DiagnosisError", "add", "diagnose"]

@@ -56,10 +56,10 @@ def subsystem(effect: Effect) -> str:
 
 
 @dataclass(frozen=True)
-class Hints:
-    """What records show by themselves: ``lines`` [Hz] in what a model leaves, and the position's ``resolution`` [m].
+class RecordFeatures:
+    """What records show by themselves: spectral ``lines`` [Hz] of a residual, the position's ``resolution`` [m].
 
-    Shapes in Hz are tried at the lines too; a parameter that is ``observed`` is tried at what was seen, and stays.
+    Frequencies are tried at the lines too; a parameter that is ``observed`` is tried at what was seen, and stays.
     """
 
     lines: tuple[float, ...] = ()
@@ -71,18 +71,18 @@ def observed(effect: Effect) -> bool:
     return any(p.observed for p in effect.parameters)
 
 
-def probes(effect: Effect, hints: Hints, sizes: Sequence[float] = SIZES) -> Iterator[list[Probe]]:
+def probes(effect: Effect, features: RecordFeatures, sizes: Sequence[float] = SIZES) -> Iterator[list[Probe]]:
     """Groups of probes, one group per shape: each of its members moves one parameter off its null value.
 
     ``sizes``: how far, of the default; further ones than the first are for the default shape alone.
     """
     if observed(effect):
         for p in effect.parameters:
-            if p.observed == "resolution" and p.null is not None and p.bounds[0] < hints.resolution <= p.bounds[1]:
+            if p.observed == "resolution" and p.null is not None and p.bounds[0] < features.resolution <= p.bounds[1]:
                 key = f"{effect.name}.{p.name}"
-                yield [Probe({key: hints.resolution}, key, p.null)]
+                yield [Probe({key: features.resolution}, key, p.null)]
         return
-    lines = hints.lines
+    lines = features.lines
     shape = [p for p in effect.parameters if p.null is None and p.unit != ANGLE]
     angles = [p for p in effect.parameters if p.null is None and p.unit == ANGLE]
     moved = [p for p in effect.parameters if p.null is not None and p.free]

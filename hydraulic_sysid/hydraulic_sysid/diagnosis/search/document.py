@@ -6,47 +6,40 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from hydraulic_sim.model import Model
-from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.diagnosis.compare.document import model_document
-from hydraulic_sysid.estimation.estimate import Settings
 
-from . import verdict
+from . import verdict as verdicts
 from .candidates import subsystem
-from .curves import curves
-from .levels import Level
-from .pieces import EVERY, STRETCH, Split
-from .rivals import Rival
-from .search import Found
-from .shape import Shape
+from .holdout import BLOCK, EVERY
+from .misfit import Misfit
+from .nonparametric_curves import NonparametricCurve
+from .search import SearchResult
 from .uncertainty import Known
+from .verdict import MISSING, OUTSIDE, UNSEEN, Verdict
+from .worst_segments import worst_segments
 
 _NEAREST = 3
-_TELLING = 0.5  # share of what is left, from which a curve says where it is
+_CLEAR = 0.5  # share of what is left, from which a curve says where it is
 
 
 def document(
-    model: Model, records: Sequence[Record], held_out: Sequence[Record], parts: Split, settings: Settings,
-    found: Found, rivals: Mapping[str, Sequence[Rival]], family: Mapping[str, Sequence[str]],
-    known: Mapping[str, Known], kind: str, shapes: Sequence[Shape],
-) -> dict[str, Any]:  # fmt: skip
-    """The document, still without balances (`add_balances`); arrays NumPy, SI. ``family``: see `verdict.alike`."""
-    base, final = found.base, found.final
-    channels = list(dict.fromkeys(c for p in parts.pieces for c in p.channels))
-    named = _named(found, rivals, kind, family)
-    imitations = verdict.imitated([*records, *held_out])
-    effects = _effects(found, rivals, known)
-    levels = {"explained": final.level.variance <= 1.0 + 2.0 * verdict.UNSEEN, "off": kind == verdict.OUTSIDE}
+    result: SearchResult, verdict: Verdict, known: Mapping[str, Known], curves: Sequence[NonparametricCurve]
+) -> dict[str, Any]:
+    """The document, still without balances (`with_balances`); arrays NumPy, SI."""
+    final = result.final
+    records = {role: result.split.records(role == "validation") for role in ("fit", "validation")}
+    imitations = verdicts.imitated([r for every in records.values() for r in every])
+    outside = verdict.kind == OUTSIDE
+    explained = final.misfit.variance <= 1.0 + 2.0 * UNSEEN
     return {
         **heading("diagnose", 2),
-        "model": model_document(model),
+        "model": model_document(result.model),
         "settings": {
-            "segment_length": settings.length,
-            "validation_block": STRETCH,
-            "validation_every": None if held_out else EVERY,
+            "segment_length": result.settings.length,
+            "validation_block": BLOCK,
+            "validation_every": None if records["validation"] else EVERY,
         },
         "records": [
             {
@@ -54,131 +47,129 @@ def document(
                 "source": str(r.source),
                 "duration": r.duration,
                 "samples": len(r),
-                "role": "validation" if any(r is h for h in held_out) else "fit",
+                "role": role,
             }
-            for r in (*records, *held_out)
-        ],  # fmt: skip
-        "channels": channels,
-        "noise_std": _noise(parts),
+            for role, every in records.items()
+            for r in every
+        ],
+        "channels": result.split.channels,
+        "noise_std": {
+            c: {
+                s.record.name: float(s.noise_std[s.channels.index(c)]) for s in result.split.segments if c in s.channels
+            }
+            for c in result.split.channels
+        },
         "verdict": {
-            "kind": kind,
-            "level": "explained" if levels["explained"] else "off" if levels["off"] else "close",
-            "effects": named,
-            "subsystem": _subsystem(found, kind, shapes),
-            "text": verdict.sentences(found, rivals, kind, shapes, family) + verdict.warning(named, imitations),
+            "kind": verdict.kind,
+            "level": "explained" if explained else "off" if outside else "close",
+            "effects": verdict.possible,
+            "subsystem": verdicts.place(result, verdict, curves),
+            "text": verdicts.sentences(result, verdict, curves) + verdicts.warning(verdict.possible, imitations),
             "imitated": imitations,
         },
         "residual": {
             "unit": "residual over noise",
-            "before": _level(base.level),
-            "after": _level(final.level),
-            "after_each_effect": [{"name": name, **_level(at)} for name, at in found.steps],
+            "before": _residual(result.base.misfit),
+            "after": _residual(final.misfit),
+            "after_each_effect": [{"name": name, **_residual(after)} for name, after in result.misfits.items()],
         },
-        "effects": effects,
+        "effects": _effects(result, verdict, known),
         "competing_models": {
             name: [
                 {
-                    "name": r.name,
-                    "residual_after": r.level.rms_held_out,
-                    "chi_square_difference": r.margin,
-                    "distinguishable": r.told_apart,
-                    "collinearity": r.collinearity,
+                    "name": c.name,
+                    "residual_after": c.misfit.rms_validation,
+                    "chi_square_difference": c.difference,
+                    "distinguishable": c.distinguishable,
+                    "collinearity": c.collinearity,
                 }
-                for r in every
+                for c in every
             ]
-            for name, every in rivals.items()
+            for name, every in verdict.competing.items()
         },
-        "parameters": _parameters(final.model, known, [k for k in final.anchor.keys]),
-        "unexplained_share": verdict.left_over(found),
-        "nonparametric_curves": [_shape(s) for s in shapes],
-        "nearest_effects": [t.name for t in final.trials[:_NEAREST]] if kind == verdict.OUTSIDE else [],
+        "parameters": _parameters(final.model, known, final.linearisation.parameters.keys),
+        "unexplained_share": verdicts.unexplained_share(result),
+        "nonparametric_curves": [_curve(c) for c in curves],
+        "nearest_effects": [r.name for r in final.refits[:_NEAREST]] if outside else [],
         "balances": [],
-        "worst_segments": curves(parts, base, final),
+        "worst_segments": worst_segments(result),
     }
 
 
-def added_document(
-    model: Model, records: Sequence[Record], held_out: Sequence[Record], parts: Split, settings: Settings,
-    found: Found, known: Mapping[str, Known], confirmed: bool,
-) -> dict[str, Any]:  # fmt: skip
+def added_document(result: SearchResult, known: Mapping[str, Known], confirmed: bool) -> dict[str, Any]:
     """The document of one effect added on request: the same keys, as far as they apply."""
-    whole = document(model, records, held_out, parts, settings, found, {}, {}, known, verdict.MISSING, ())
-    before, after = found.base.level.rms_held_out, found.final.level.rms_held_out
-    name = found.added[0]
+    (name,) = result.added
+    whole = document(result, Verdict(MISSING, [name], {}, {}), known, ())
+    before, after = (number["validation"] for number in (whole["residual"]["before"], whole["residual"]["after"]))
+    text = f"With {name} the residual on validation data goes from {before:.4g} to {after:.4g} × noise"
     whole |= heading("add", 2)
     whole["verdict"] |= {
         "kind": "confirmed" if confirmed else "not confirmed",
         "level": whole["verdict"]["level"] if confirmed else "off",
-        "text": f"With {name} the residual on held-out data goes from {before:.4g} to {after:.4g} times the noise"
-        + ("." if confirmed else ": no more than chance or fitting gives; the data do not bear it out."),
+        "text": text + ("." if confirmed else ": no more than chance or fitting gives; the data do not bear it out."),
     }
-    for key in ("competing_models", "nonparametric_curves", "nearest_effects", "balances"):
-        del whole[key]
-    return whole
+    unused = ("competing_models", "nonparametric_curves", "nearest_effects", "balances")
+    return {k: v for k, v in whole.items() if k not in unused}
 
 
-def _level(at: Level) -> dict[str, float]:
-    return {"fit": at.rms_fitted, "validation": at.rms_held_out}
+def with_balances(
+    whole: dict[str, Any],
+    before: Sequence[Mapping[str, Any]],
+    after: Sequence[Mapping[str, Any]],
+    suspected: Sequence[str],
+) -> dict[str, Any]:
+    """The document with balances. ``suspected``: subsystems by what they explain of them, the most first; it says where
+    something outside the library is, unless a curve explains most of that."""
+    later = {b["name"]: b["ratio"] for b in after}
+    keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
+    rows = [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]
+    clear = any(c["explained_share"] > _CLEAR for c in whole["nonparametric_curves"][:1])
+    where = suspected[0] if suspected and not clear else whole["verdict"]["subsystem"]
+    return {**whole, "balances": rows, "verdict": {**whole["verdict"], "subsystem": where}}
 
 
-def _named(
-    found: Found, rivals: Mapping[str, Sequence[Rival]], kind: str, family: Mapping[str, Sequence[str]]
-) -> list[str]:
-    names = list(found.added)
-    if kind == verdict.TIED:
-        names += [other for name in found.added for other in verdict.same_as(name, rivals, family)]
-    return list(dict.fromkeys(names))
+def _residual(misfit: Misfit) -> dict[str, float]:
+    return {"fit": misfit.rms_fit, "validation": misfit.rms_validation}
 
 
-def _effects(found: Found, rivals: Mapping[str, Sequence[Rival]], known: Mapping[str, Known]) -> list[dict[str, Any]]:
-    """All that was tried, ranked: what was found, then what could stand in its place, then the rest of the library."""
-    library = found.base.model.library
-    rows: list[dict[str, Any]] = []
-    previous = found.base.level
-    for name, at in found.steps:
-        rows.append(_row(name, library, True, previous, at, found.final.model, known))
-        previous = at
-    done = set(found.added)
-    for every in rivals.values():
-        for r in every:
-            if r.name not in done:
-                done.add(r.name)
-                trial = next(t for s in found.rivals.values() for t in s.trials if t.name == r.name)
-                rows.append(_row(r.name, library, False, found.base.level, r.level, trial.refit.model, {}))
-    for trial in found.base.trials:
-        if trial.name not in done:
-            done.add(trial.name)
-            rows.append(_row(trial.name, library, False, found.base.level, trial.level, trial.refit.model, {}))
-    count = max(found.base.level.n_fitted, 1)
-    for prospect in found.base.prospects:
-        if prospect.effect.name not in done:
-            done.add(prospect.effect.name)
-            left = max(found.base.level.fitted - max(prospect.gain, 0.0), 0.0)
-            rows.append(
-                {
-                    "name": prospect.effect.name,
-                    "subsystem": subsystem(prospect.effect),
-                    "added": False,
-                    "refitted": False,
-                    "residual_before": found.base.level.rms_fitted,
-                    "residual_after": math.sqrt(left / count),
-                    "parameters": [],
-                }
-            )
-    return [{"rank": i + 1, **row} for i, row in enumerate(rows)]
+def _effects(result: SearchResult, verdict: Verdict, known: Mapping[str, Known]) -> list[dict[str, Any]]:
+    """All that was tried, ranked: what was added, then what could be in its place, then the rest of the library."""
+    base = result.base.misfit
+    rows: dict[str, dict[str, Any]] = {}
+    previous = base
+    for name, after in result.misfits.items():
+        rows[name] = _row(name, True, previous, after, result.final.model, known)
+        previous = after
+    for c in (c for every in verdict.competing.values() for c in every):
+        rows.setdefault(c.name, _row(c.name, False, base, c.misfit, c.model, {}))
+    for r in result.base.refits:
+        rows.setdefault(r.name, _row(r.name, False, base, r.misfit, r.refit.model, {}))
+    for s in result.base.scores:
+        left = max(base.fit - max(s.reduction, 0.0), 0.0)
+        unfitted = {
+            "name": s.effect.name,
+            "subsystem": subsystem(s.effect),
+            "added": False,
+            "refitted": False,
+            "residual_before": base.rms_fit,
+            "residual_after": math.sqrt(left / max(base.n_fit, 1)),
+            "parameters": [],
+        }
+        rows.setdefault(s.effect.name, unfitted)
+    return [{"rank": i + 1, **row} for i, row in enumerate(rows.values())]
 
 
 def _row(
-    name: str, library: Any, found: bool, before: Level, after: Level, model: Model, known: Mapping[str, Known]
+    name: str, added: bool, before: Misfit, after: Misfit, model: Model, known: Mapping[str, Known]
 ) -> dict[str, Any]:
-    effect = library[name]
+    effect = model.library[name]
     return {
         "name": name,
         "subsystem": subsystem(effect),
-        "added": found,
+        "added": added,
         "refitted": True,
-        "residual_before": before.rms_held_out,
-        "residual_after": after.rms_held_out,
+        "residual_before": before.rms_validation,
+        "residual_after": after.rms_validation,
         "parameters": _parameters(model, known, [f"{name}.{p.name}" for p in effect.parameters]),
     }
 
@@ -201,50 +192,16 @@ def _parameters(model: Model, known: Mapping[str, Known], keys: Sequence[str]) -
     return rows
 
 
-def _noise(parts: Split) -> dict[str, dict[str, float]]:
-    found: dict[str, dict[str, float]] = {}
-    for p in parts.pieces:
-        for c, sigma in zip(p.channels, p.noise.tolist(), strict=True):
-            found.setdefault(c, {})[p.record.name] = float(sigma)
-    return found
-
-
-def _subsystem(found: Found, kind: str, shapes: Sequence[Shape]) -> str | None:
-    """Where it is: of the first effect found, or of the curve that explains most of what no effect does."""
-    if kind == verdict.COMPLETE:
-        return None
-    if kind != verdict.OUTSIDE:
-        return subsystem(found.base.model.library[found.added[0]])
-    return shapes[0].subsystem if shapes else None
-
-
-def add_balances(
-    result: dict[str, Any], before: list[dict[str, Any]], after: list[dict[str, Any]], blamed: Sequence[str]
-) -> None:
-    """Put balances into a document. ``blamed``: subsystems by what they explain of them, the most first; it says where
-    something outside the library is, unless a curve explains most of that."""
-    result["balances"] = _balances(before, after)
-    curve = result["nonparametric_curves"][0]["explained_share"] if result["nonparametric_curves"] else 0.0
-    if result["verdict"]["kind"] == verdict.OUTSIDE and curve <= _TELLING and blamed:
-        result["verdict"]["subsystem"] = blamed[0]
-
-
-def _shape(s: Shape) -> dict[str, Any]:
+def _curve(c: NonparametricCurve) -> dict[str, Any]:
     return {
-        "place": s.place,
-        "subsystem": s.subsystem,
-        "summary": s.summary,
-        "variable": s.variable,
-        "unit": s.unit,
-        "explained_share": s.share,
-        "knots": np.asarray(s.centre),
-        "value": np.asarray(s.height),
-        "low": np.asarray(s.height - s.error),
-        "high": np.asarray(s.height + s.error),
+        "place": c.place,
+        "subsystem": c.subsystem,
+        "summary": c.summary,
+        "variable": c.variable,
+        "unit": c.unit,
+        "explained_share": c.share,
+        "knots": c.knots,
+        "value": c.value,
+        "low": c.value - c.error,
+        "high": c.value + c.error,
     }
-
-
-def _balances(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    later = {b["name"]: b["ratio"] for b in after}
-    keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
-    return [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]

@@ -1,8 +1,8 @@
-"""The search for what is missing: forward by refits of what the screen promises, backward by leaving out.
+"""The search for what is missing: forward by refits of the best candidates, backward by leaving out.
 
 Forward selection with backward elimination (Efroymson 1960; here as in Draper & Smith, Applied Regression Analysis,
-ch. 15), on pieces that were held out as well as on those that were fitted: an effect that does not lower both is none.
-Then every member is set against what would take its place, so that a stand-in that came first does not stay.
+ch. 15), on segments for validation as well as on those that were fitted: an effect that does not lower both is none.
+Then every effect added is set against what would take its place, so that a proxy that came first does not stay.
 """
 
 from __future__ import annotations
@@ -11,245 +11,267 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
-from hydraulic_sysid.estimation.estimate import Settings
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.estimation.errors import SegmentError
+from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
+from hydraulic_sysid.estimation.parameters import bounded
 
-from .anchor import Anchor, anchor, fitted, keys_of
-from .candidates import Hints, candidates, observed, subsystem
-from .chord import Refit, as_it_is, refit
-from .levels import Level, level, material, repaired
-from .pieces import Split
-from .screen import Prospect, screen
+from .candidates import candidates, observed, subsystem
+from .errors import DiagnosisError
+from .frozen_jacobian import Refit, as_it_is, refit
+from .holdout import Split, split
+from .linearisation import Linearisation
+from .misfit import Misfit, explained, material, misfit
+from .score_test import CandidateScore, score
+from .spectral_lines import record_features
 
-PROMISING = 0.04  # of the best predicted gain, from which a candidate is refitted
+PROMISING = 0.04  # of the best predicted reduction, from which a candidate is refitted
 MOST_REFITS = 8
 LATER_REFITS = 4  # once something was added, …
 ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
 FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
-NEAR = 0.93  # of the best gain, from which a refit is finished, …
+NEAR = 0.93  # of the best reduction, from which a refit is finished, …
 FAR = 5.0  # … if it leaves no more than so many times what the best leaves
 MOST_EFFECTS = 3
-FURTHER = 0.25  # of what is left, which a further effect must repair, unless it repairs a good part of all
-NEEDED = 0.02  # of all that was repaired, which an effect must repair beside the others to stay
-LAW = 0.0025  # of all that was repaired: what a law that is right to a twentieth leaves for others of its subsystem …
+FURTHER = 0.25  # of what is left, which a further effect must explain, unless it explains a good part of all
+NEEDED = 0.02  # of all that was explained, which an effect must explain beside the others to stay
+LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
 ELSEWHERE = 0.0005  # … and for those of other subsystems
-DISTANT = 0.02  # of what an effect repairs, by which a quick refit in its place may lie above, to be finished
-SETTLED = 0.006  # mean square beyond the noise below which nothing more is looked for
+DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
+NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing more is looked for
 EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
 MOST_SWAPS = 3
-MOSTLY = 0.9  # of what noise does not explain: where more is repaired, nobody asks what else might be nearest
-ALONE = 0.5  # of what the best candidate repairs at first, below which all others leave it without a rival
-HOPELESS = 0.6  # of what noise does not explain: where less is repaired, exchanging effects will not do either
-PROMISED = 0.5  # of what an effect must repair, which its quick refit must show for it to be fitted to the end
+MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
+ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
+HOPELESS = 0.6  # of what noise does not explain: where less is explained, exchanging effects will not do either
+PROMISED = 0.5  # of what an effect must explain, which its quick refit must show for it to be fitted to the end
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
 LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
 
 Say = Callable[[str], None]
-Enough = Callable[[str, Level, float], bool]
+Enough = Callable[[str, Misfit, float], bool]
 
 
 @dataclass(frozen=True)
-class Trial:
+class CandidateRefit:
     """A candidate, refitted beside the effects that are on."""
 
     name: str
-    predicted: float
     refit: Refit
-    level: Level
+    misfit: Misfit
 
 
 @dataclass(frozen=True)
-class Stage:
-    """A model with some effects, fitted, and the candidates tried on top of it, best first.
+class SearchState:
+    """A model with some effects, fitted, and the candidates refitted on top of it, best first.
 
-    ``anchor`` has no effects that records show by themselves: such as rounding have no derivative, and `model` and
-    ``level`` are with them, the parameters as they are without; ``residual`` (S, m) per record is what `model` leaves.
+    ``linearisation`` has no effects that records show by themselves: such as rounding have no derivative, and ``model``
+    and ``misfit`` are with them, the parameters as they are without; ``residual`` (S, m) per record is what ``model``
+    leaves.
     """
 
     model: Model
-    anchor: Anchor
-    level: Level
-    residual: list[NDArray[np.float64]]
-    trials: list[Trial] = field(default_factory=list)
-    prospects: list[Prospect] = field(default_factory=list)
+    linearisation: Linearisation
+    misfit: Misfit
+    residual: Sequence[Array]
+    refits: list[CandidateRefit] = field(default_factory=list)
+    scores: list[CandidateScore] = field(default_factory=list)
+
+    def others(self, name: str) -> list[CandidateRefit]:
+        """The refits with another effect than this one."""
+        return [r for r in self.refits if r.name != name]
 
 
 @dataclass(frozen=True)
-class Found:
-    """Where a search ended. ``rivals[name]``: the stage without that effect, with what was tried in its place."""
+class SearchResult:
+    """Where a search ended.
 
-    base: Stage
-    final: Stage
-    added: list[str]
-    steps: list[tuple[str, Level]]
-    rivals: dict[str, Stage]
+    ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
+    ``competing[name]``: the state without that effect, with what was tried in its place.
+    """
+
+    model: Model
+    split: Split
+    settings: FitSettings
+    base: SearchState
+    final: SearchState
+    misfits: dict[str, Misfit]
+    competing: dict[str, SearchState]
+
+    @property
+    def added(self) -> list[str]:
+        """Effects, the one that explains most first."""
+        return list(self.misfits)
 
 
 class Search:
     """One search over one split of records."""
 
-    def __init__(self, split: Split, settings: Settings, say: Say, hints: Callable[[Anchor], Hints]) -> None:
-        self.split, self.settings, self.say, self._hints = split, settings, say, hints
+    def __init__(self, model: Model, split: Split, settings: FitSettings, say: Say) -> None:
+        self.given, self.split, self.settings, self.say = model, split, settings, say
         self._last = replace(settings, most_steps=LAST_STEPS, least_gain=LAST_GAIN)
 
-    def stage(self, model: Model, settings: Settings | None = None) -> Stage:
+    @classmethod
+    def of(
+        cls, model: Model, records: Sequence[Record], validation: Sequence[Record], settings: FitSettings, say: Say
+    ) -> Search:
+        """Cut the records; free parameters without bounds get those of a data sheet.
+
+        :raises DiagnosisError: there are no records, or one cannot be cut.
+        """
+        if not records:
+            raise DiagnosisError("there is no record to diagnose")
+        model = bounded(model)
+        try:
+            return cls(model, split(records, validation, Plant(model), settings.length), settings, say)
+        except SegmentError as error:
+            raise DiagnosisError(str(error)) from None
+
+    def begin(self) -> SearchState:
+        """The model as it was given, fitted."""
+        self.say("fitting the model as it is")
+        return self.state(self.given)
+
+    def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
         smooth, seen = model, _observed(model)
         for name in seen:
             smooth = smooth.without_effect(name)
-        there = anchor(fitted(smooth, self.split, settings or self.settings), self.split)
-        whole = _with_values(model, there.model)
+        done = fit_segments(Plant(smooth), self.split.to_fit, smooth.movable_keys(), settings or self.settings)
+        at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split)
         if not seen:
-            return Stage(whole, there, level(self.split, there), there.residual)
-        rounded = as_it_is(there, whole)
-        return Stage(whole, there, level(self.split, rounded), rounded.raw)
+            return SearchState(at.model, at, misfit(self.split, at.costs), at.residual)
+        rounded = as_it_is(at, _with_values(model, at.model))
+        return SearchState(rounded.model, at, misfit(self.split, rounded.costs), rounded.residual)
 
-    def explore(self, base: Stage, exclude: Sequence[str] = (), most: int = MOST_REFITS) -> Stage:
-        """Screen all candidates on a stage and refit the best."""
-        point = base.anchor
-        found = screen(point, [e for e in candidates(base.model) if e.name not in exclude], self._hints(point))
-        if not found:
+    def explore(self, base: SearchState, most: int = MOST_REFITS) -> SearchState:
+        """Score all candidates on a state and refit the best."""
+        at = base.linearisation
+        scores = score(at, candidates(base.model), record_features(at))
+        if not scores:
             return base
-        floor = max(PROMISING * found[0].gain, 0.2 * base.level.least)
-        trials = []
-        for prospect in _varied([p for p in found if p.gain > floor], ALIKE if most < MOST_REFITS else most)[:most]:
-            self.say(f"refitting with {prospect.effect.name}")
-            trials.append(self.trial(base, prospect))
-        trials.sort(key=lambda t: t.level.total)
-        return replace(base, anchor=point.slim(), trials=trials, prospects=found)
+        least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)
+        best = _varied([s for s in scores if s.reduction > least], ALIKE if most < MOST_REFITS else most)[:most]
+        refits = sorted((self.refit(base, s) for s in best), key=lambda r: r.misfit.total)
+        return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
 
-    def trial(self, base: Stage, prospect: Prospect) -> Trial:
-        """A candidate refitted on a stage, from where the screen saw it."""
-        point, name = base.anchor, prospect.effect.name
-        done = refit(point, point.model.with_effect(name), prospect.start)
+    def refit(self, base: SearchState, candidate: CandidateScore) -> CandidateRefit:
+        """A candidate refitted on a state, from where its score is best."""
+        at, name = base.linearisation, candidate.effect.name
+        self.say(f"refitting with {name}")
+        done = refit(at, at.model.with_effect(name), candidate.start)
         if _observed(base.model):
-            done = as_it_is(point, _with_values(base.model.with_effect(name), done.model))
-        return Trial(name, prospect.gain, done, level(self.split, done))
+            done = as_it_is(at, _with_values(base.model.with_effect(name), done.model))
+        return CandidateRefit(name, done, misfit(self.split, done.costs))
 
-    def finish(self, base: Stage, enough: Enough) -> Stage | None:
-        """The best of the trials, fitted to the end; None where none is worth it.
+    def finish(self, base: SearchState, enough: Enough) -> SearchState | None:
+        """The best of the refits, fitted to the end; None where none is worth it.
 
-        ``enough(name, level, part)``: whether an effect's level is a part of the way to being worth it.
+        ``enough(name, misfit, part)``: whether an effect's misfit is a part of the way to being worth it.
         """
-        worth = [t for t in base.trials if material(base.level, t.level) and enough(t.name, t.level, PROMISED)]
+        worth = [r for r in base.refits if material(base.misfit, r.misfit) and enough(r.name, r.misfit, PROMISED)]
         if not worth:
             return None
-        top = base.level.total - worth[0].level.total
+        top = base.misfit.total - worth[0].misfit.total
+        near = [r for r in worth if base.misfit.total - r.misfit.total >= NEAR * top]
         found = []
-        near = [t for t in worth if base.level.total - t.level.total >= NEAR * top]
-        for trial in [t for t in near if t.level.excess <= FAR * worth[0].level.excess + t.level.least][:FULL]:
-            self.say(f"fitting with {trial.name}")
+        for tried in [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][:FULL]:
+            self.say(f"fitting with {tried.name}")
             try:
-                found.append(self.stage(trial.refit.model, self._last))
+                state = self.state(tried.refit.model, self._last)
             except SimulationError:
                 continue
-        found = [f for f in found if material(base.level, f.level) and enough(_new(f, base), f.level, 1.0)]
-        return min(found, key=lambda f: f.level.total, default=None)
+            if material(base.misfit, state.misfit) and enough(tried.name, state.misfit, 1.0):
+                found.append(state)
+        return min(found, key=lambda s: s.misfit.total, default=None)
 
-    def run(self, model: Model) -> Found:
-        """Forward, backward, and every member against its rivals."""
-        self.say("fitting the model as it is")
-        base = stage = self.explore(self.stage(model))
-        added: list[str] = []
-        path = [stage]
+    def run(self) -> SearchResult:
+        """Forward, backward, and every effect added against its competitors."""
+        base = self.explore(self.begin())
+        path, added = [base], list[str]()
         while len(added) < MOST_EFFECTS:
             better = self.finish(path[-1], partial(_worth, base, path[-1], added) if added else _anything)
             if better is None:
                 break
             added.append(_new(better, path[-1]))
-            nothing = better.level.variance - 1.0 < SETTLED
-            last = len(added) == MOST_EFFECTS and repaired(base.level, better.level) > MOSTLY
+            nothing = better.misfit.variance - 1.0 < NOTHING_LEFT
+            last = len(added) == MOST_EFFECTS and explained(base.misfit, better.misfit) > MOSTLY
             path.append(better if nothing or last else self.explore(better, most=LATER_REFITS))
             if nothing:
                 break
-        rivals = {added[-1]: path[-2]} if added else {}
-        if len(added) <= 1:
-            return Found(base, path[-1], added, [(name, path[-1].level) for name in added], rivals)
-        final, kept, rivals = self._review(base, path[-1], added, rivals)
-        if kept == added:
-            return Found(base, final, added, [(n, p.level) for n, p in zip(added, path[1:], strict=True)], rivals)
-        return Found(base, final, kept, self._steps(base, final, kept), rivals)
+        misfits = {name: state.misfit for name, state in zip(added, path[1:], strict=True)}
+        final, competing = path[-1], {added[-1]: path[-2]} if added else {}
+        if len(added) > 1:
+            final, kept, competing = self._reviewed(base, final, added, competing)
+            if kept != added:
+                misfits = self._misfits(base, final, kept)
+        return SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
 
-    def _review(
-        self, base: Stage, stage: Stage, added: list[str], rivals: dict[str, Stage]
-    ) -> tuple[Stage, list[str], dict[str, Stage]]:
+    def add(self, name: str) -> SearchResult:
+        """One effect on top of the model, whatever it explains.
+
+        :raises DiagnosisError: the records do not excite it.
+        """
+        base = self.begin()
+        self.say(f"looking where {name} begins")
+        at = base.linearisation
+        scores = score(at, [self.given.library[name]], record_features(at))
+        if not scores:
+            raise DiagnosisError(f"{name} changes nothing in these records: they do not excite it")
+        tried = self.refit(base, scores[0])
+        self.say(f"fitting with {name}")
+        final = self.state(tried.refit.model)
+        base = replace(base, refits=[tried], scores=scores)
+        return SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
+
+    def _reviewed(
+        self, base: SearchState, state: SearchState, added: list[str], competing: dict[str, SearchState]
+    ) -> tuple[SearchState, list[str], dict[str, SearchState]]:
         """Leave out what the others make superfluous; put in an effect's place what fits better there.
 
-        ``rivals``: of the effect that came last, known already; it, too, may be superfluous, where it was only what
+        ``competing``: of the effect that came last, known already; it, too, may be superfluous, where it was only what
         brought the fit of the others out of a local minimum.
         """
-        added, rivals, swaps = list(added), dict(rivals), 0
-        queue = list(added)
-        while queue and len(added) > 0:
-            name = queue.pop(0)
-            if name not in added:
+        swaps, queue = 0, added
+        while queue:
+            name, queue = queue[0], queue[1:]
+            if len(added) == 1 or _without_competitor(base, state, name):
+                competing = {**competing, name: base}
                 continue
-            if len(added) == 1:
-                rivals[name] = base
-                break
-            if _unrivalled(base, stage, name):
-                rivals[name] = base
-                continue
-            without = self.stage(stage.model.without_effect(name), self._last)
-            lost = without.level.total - stage.level.total
-            part = repaired(without.level, stage.level)
+            without = self.state(state.model.without_effect(name), self._last)
             others = [a for a in added if a != name]
-            if (
-                not material(without.level, stage.level)
-                or _mends_a_law(base, without, others, name, stage.level)
-                or (part < FURTHER and lost < NEEDED * (base.level.total - stage.level.total))
-            ):
+            if _superfluous(base, without, state, name, others):
                 self.say(f"leaving out {name}")
-                added.remove(name)
-                stage, rivals, queue = without, {}, list(added)
+                added, state, competing, queue = others, without, {}, others
                 continue
-            if name in rivals:
+            if name in competing:
                 continue
             without = self.explore(without, most=LATER_REFITS)
-            rivals[name] = without
-            left = stage.level.excess + DISTANT * (without.level.total - stage.level.total)
-            close = [t for t in without.trials if t.name != name and t.level.excess < left]
-            if not close or repaired(base.level, stage.level) < HOPELESS:
-                continue
-            without = replace(without, trials=close)
-            other = self.finish(without, _anything)
-            if (
-                other is not None
-                and name not in other.model.effects
-                and swaps < MOST_SWAPS
-                and (stage.level.total - other.level.total > stage.level.least)
-            ):
+            competing = {**competing, name: without}
+            near = _near(base, without, state, name)
+            other = self.finish(near, _anything) if swaps < MOST_SWAPS else None
+            if other is not None and state.misfit.total - other.misfit.total > state.misfit.least:
                 new = _new(other, without)
                 self.say(f"{new} in the place of {name}")
-                added[added.index(name)] = new
-                stage, swaps = other, swaps + 1
-                rivals, queue = {new: without}, [a for a in added if a != new]
-        return stage, added, rivals
+                added = [new if a == name else a for a in added]
+                state, swaps, competing, queue = other, swaps + 1, {new: near}, others
+        return state, added, competing
 
-    def _steps(self, base: Stage, final: Stage, added: list[str]) -> list[tuple[str, Level]]:
-        """The level after each effect, in the order of how much it repairs: the largest first."""
-        if len(added) <= 1:
-            return [(name, final.level) for name in added]
-        single = {}
-        for name in added:
-            trial = next((t for t in base.trials if t.name == name), None)
-            single[name] = trial.level if trial is not None else None
-        order = sorted(added, key=lambda n: single[n].total if single[n] is not None else float("inf"))  # type: ignore[union-attr]
-        steps: list[tuple[str, Level]] = []
+    def _misfits(self, base: SearchState, final: SearchState, added: Sequence[str]) -> dict[str, Misfit]:
+        """The misfit after each effect, in the order of how much it explains by itself: the largest first."""
+        alone = {r.name: r.misfit.total for r in base.refits}
+        order = sorted(added, key=lambda name: alone.get(name, float("inf")))
+        found: dict[str, Misfit] = {}
         model = base.model
-        for i, name in enumerate(order):
-            if i == len(order) - 1:
-                steps.append((name, final.level))
-                break
-            own = [k for k in final.model.keys() if k.startswith(f"{name}.")]  # noqa: SIM118, a method of the model
-            model = model.with_effect(name, {k.split(".", 1)[1]: final.model.value(k) for k in own})
-            steps.append((name, self.stage(model).level))
-        added[:] = order
-        return steps
+        for name in order[:-1]:
+            own = [p.name for p in model.library[name].parameters]
+            model = model.with_effect(name, {p: final.model.value(f"{name}.{p}") for p in own})
+            found[name] = self.state(model).misfit
+        return {**found, **{name: final.misfit for name in order[-1:]}}
 
 
 def _observed(model: Model) -> list[str]:
@@ -259,56 +281,75 @@ def _observed(model: Model) -> list[str]:
 
 def _with_values(model: Model, fitted: Model) -> Model:
     """The model with what was fitted in one that lacks some of its effects."""
-    return model.with_values({k: fitted.value(k) for k in keys_of(fitted)}, source="fitted")
+    return model.with_values({k: fitted.value(k) for k in fitted.movable_keys()}, source="fitted")
 
 
-def _worth(base: Stage, before: Stage, added: Sequence[str], name: str, after: Level, part: float) -> bool:
-    """Whether a further effect repairs enough (times ``part``): a good part of what is left, or something of what there
-    was, where the others repair most of it. What repairs little where most is left would be a stand-in."""
-    if _mends_a_law(base, before, added, name, after, part):
+def _worth(base: SearchState, before: SearchState, added: Sequence[str], name: str, after: Misfit, part: float) -> bool:
+    """Whether a further effect explains enough (times ``part``): a good part of what is left, or something of what
+    there was, where the others explain most of it. What explains little where most is left would be a proxy."""
+    if _absorbs(base, before, added, name, after, part):
         return False
-    if repaired(before.level, after) >= part * FURTHER:
+    if explained(before.misfit, after) >= part * FURTHER:
         return True
-    most = repaired(base.level, before.level) >= HOPELESS
-    return most and repaired(base.level, after) - repaired(base.level, before.level) >= part * NEEDED
+    most = explained(base.misfit, before.misfit) >= HOPELESS
+    return most and explained(base.misfit, after) - explained(base.misfit, before.misfit) >= part * NEEDED
 
 
-def _mends_a_law(base: Stage, before: Stage, others: Sequence[str], name: str, after: Level, part: float = 1.0) -> bool:
-    """Whether an effect repairs so little of all that it may be what the laws of the others leave.
+def _absorbs(
+    base: SearchState, before: SearchState, others: Sequence[str], name: str, after: Misfit, part: float = 1.0
+) -> bool:
+    """Whether an effect explains so little of all that it may only absorb the discrepancy of the others' laws.
 
-    One of another subsystem that repairs most of what is left is believed.
+    One of another subsystem that explains most of what is left is believed.
     """
     library = base.model.library
     alike = any(subsystem(library[name]) == subsystem(library[other]) for other in others)
-    if not alike and repaired(before.level, after) >= part * HOPELESS:
+    if not alike and explained(before.misfit, after) >= part * HOPELESS:
         return False
     least = part * (LAW if alike else ELSEWHERE)
-    return before.level.total - after.total < least * (base.level.total - after.total)
+    return before.misfit.total - after.total < least * (base.misfit.total - after.total)
 
 
-def _anything(name: str, after: Level, part: float) -> bool:
-    """No more is asked than that a gain is one."""
+def _superfluous(base: SearchState, without: SearchState, state: SearchState, name: str, others: Sequence[str]) -> bool:
+    """Whether ``state`` is hardly better than ``without`` the effect."""
+    if not material(without.misfit, state.misfit) or _absorbs(base, without, others, name, state.misfit):
+        return True
+    lost = without.misfit.total - state.misfit.total
+    needed = NEEDED * (base.misfit.total - state.misfit.total)
+    return explained(without.misfit, state.misfit) < FURTHER and lost < needed
+
+
+def _near(base: SearchState, without: SearchState, state: SearchState, name: str) -> SearchState:
+    """The state ``without`` an effect, and of its refits those that come near the state with it."""
+    left = state.misfit.excess + DISTANT * (without.misfit.total - state.misfit.total)
+    if explained(base.misfit, state.misfit) < HOPELESS:
+        return replace(without, refits=[])
+    return replace(without, refits=[r for r in without.others(name) if r.misfit.excess < left])
+
+
+def _anything(name: str, after: Misfit, part: float) -> bool:
+    """No more is asked than that a reduction is one."""
     return True
 
 
-def _varied(found: Sequence[Prospect], most: int) -> list[Prospect]:
+def _varied(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
     """In their order, and no more than so many of one subsystem."""
-    places = [subsystem(p.effect) for p in found]
-    return [p for i, p in enumerate(found) if places[:i].count(places[i]) < most]
+    places = [subsystem(f.effect) for f in found]
+    return [f for i, f in enumerate(found) if places[:i].count(places[i]) < most]
 
 
-def _unrivalled(base: Stage, final: Stage, name: str) -> bool:
-    """Whether an effect repairs by itself most of what is off, and no other candidate comes near it: by what they
-    repair or, where in the end all is explained, by what they leave."""
-    found = {t.name: t.level for t in base.trials}
-    if name not in found or base.level.total - found[name].total < MOSTLY * base.level.excess:
+def _without_competitor(base: SearchState, final: SearchState, name: str) -> bool:
+    """Whether an effect explains by itself most of what is off, and no other candidate comes near it: by what they
+    explain or, where in the end all is explained, by what they leave."""
+    own = next((r.misfit for r in base.refits if r.name == name), None)
+    if own is None or base.misfit.total - own.total < MOSTLY * base.misfit.excess:
         return False
-    others = [at for other, at in found.items() if other != name]
-    alone = all(base.level.total - at.total < ALONE * (base.level.total - found[name].total) for at in others)
-    explained = final.level.variance - 1.0 < EXPLAINED
-    return alone or (explained and all(at.excess > FAR * (found[name].excess + at.least) for at in others))
+    others = [r.misfit for r in base.others(name)]
+    alone = all(base.misfit.total - at.total < ALONE * (base.misfit.total - own.total) for at in others)
+    little = final.misfit.variance - 1.0 < EXPLAINED
+    return alone or (little and all(at.excess > FAR * (own.excess + at.least) for at in others))
 
 
-def _new(stage: Stage, before: Stage) -> str:
-    """The effect that a stage has beyond another."""
-    return next(e for e in stage.model.effects if e not in before.model.effects)
+def _new(state: SearchState, before: SearchState) -> str:
+    """The effect that a state has beyond another."""
+    return next(e for e in state.model.effects if e not in before.model.effects)

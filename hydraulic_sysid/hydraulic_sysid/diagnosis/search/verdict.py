@@ -1,23 +1,25 @@
-"""From figures to one of four verdicts, and its sentences."""
+"""From a search's figures to one of four verdicts, and its sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.estimation.parameters import Parameters
 
-from .candidates import candidates
-from .rivals import Rival
-from .search import Found
-from .shape import Shape
+from .candidates import candidates, subsystem
+from .competing_models import CompetingModel, competing_models
+from .nonparametric_curves import NonparametricCurve
+from .search import SearchResult
 
 MISSING = "missing"
-TIED = "indistinguishable"
+INDISTINGUISHABLE = "indistinguishable"
 COMPLETE = "complete"
 OUTSIDE = "outside the library"
 
-UNSEEN = 0.015  # mean square beyond the noise that a noise floor estimated from data may miss
+UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
 SMALL = 1.2  # mean square over noise below which more may be left …
 SMALL_UNEXPLAINED = 0.4  # … namely this share
@@ -25,8 +27,49 @@ STRAINED = 0.01  # the same where an effect fits only with its shape at the end 
 LARGE = 1.03  # residual over noise from which something is missing although no effect of the library is
 
 
-def alike(model: Model, added: Sequence[str], channels: Sequence[str]) -> dict[str, list[str]]:
-    """Effects found → those that these channels cannot tell from them, however well one of them fits.
+@dataclass(frozen=True)
+class Verdict:
+    """What a search says: its ``kind``; per effect added the ``competing`` models, and the ``family`` of effects that
+    these channels cannot distinguish from it, however well one of them fits."""
+
+    kind: str
+    added: Sequence[str]
+    competing: Mapping[str, Sequence[CompetingModel]]
+    family: Mapping[str, Sequence[str]]
+
+    def indistinguishable_from(self, name: str) -> list[str]:
+        """By the errors, or by the channels."""
+        tied = [c.name for c in self.competing.get(name, ()) if not c.distinguishable]
+        return list(dict.fromkeys([*tied, *self.family.get(name, ())]))
+
+    @property
+    def possible(self) -> list[str]:
+        """What was added and, where the data do not decide, what may be in its place."""
+        tied = self.added if self.kind == INDISTINGUISHABLE else ()
+        return list(dict.fromkeys([*self.added, *(o for name in tied for o in self.indistinguishable_from(name))]))
+
+
+def judge(result: SearchResult) -> Verdict:
+    """The verdict on a search."""
+    final = result.final.misfit
+    competing = {name: competing_models(name, state, final) for name, state in result.competing.items()}
+    family = families(result.model, result.added, result.split.channels)
+    tied = bool(family) or any(not c.distinguishable for every in competing.values() for c in every)
+    return Verdict(kind_of(result, tied), result.added, competing, family)
+
+
+def alternatives(result: SearchResult, verdict: Verdict) -> dict[str, Model]:
+    """Fitted models with another effect in the place of one added, where the data do not decide."""
+    return {
+        r.name: r.refit.model
+        for name, state in result.competing.items()
+        for r in state.others(name)
+        if verdict.kind == INDISTINGUISHABLE and r.name in verdict.indistinguishable_from(name)
+    }
+
+
+def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dict[str, list[str]]:
+    """Effects added → those that these channels cannot distinguish from them.
 
     Without pressures a family of effects acts alike on the position, up to parameters that no record shows.
     """
@@ -42,84 +85,66 @@ def alike(model: Model, added: Sequence[str], channels: Sequence[str]) -> dict[s
     return found
 
 
-def left_over(found: Found) -> float:
+def unexplained_share(result: SearchResult) -> float:
     """Mean square beyond the noise, over that before anything was added (0…1)."""
-    base, final = found.base.level, found.final.level
-    seen = max(base.variance - 1.0 - UNSEEN, 0.0)
-    left = max(final.variance - 1.0 - UNSEEN, 0.0)
-    return left / seen if seen > 0.0 else 0.0
+    before, after = (max(s.misfit.variance - 1.0 - UNSEEN, 0.0) for s in (result.base, result.final))
+    return after / before if before > 0.0 else 0.0
 
 
-def kind_of(
-    found: Found, rivals: Mapping[str, Sequence[Rival]], family: Mapping[str, Sequence[str]] | None = None
-) -> str:
-    """The verdict's kind."""
-    final = found.final.level
-    if not found.added:
+def kind_of(result: SearchResult, tied: bool) -> str:
+    """The verdict's kind; ``tied``: whether anything may be in the place of what was added."""
+    final = result.final.misfit
+    if not result.added:
         return OUTSIDE if final.variance > LARGE**2 else COMPLETE
-    allowed = STRAINED if strained(found) else SMALL_UNEXPLAINED if final.variance < SMALL else UNEXPLAINED
-    if left_over(found) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
+    allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if final.variance < SMALL else UNEXPLAINED
+    if unexplained_share(result) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
-    return TIED if family or any(not r.told_apart for every in rivals.values() for r in every) else MISSING
+    return INDISTINGUISHABLE if tied else MISSING
 
 
-def strained(found: Found) -> list[str]:
-    """Shape parameters of effects found that ended at a bound: the law had to be bent to its limits to fit."""
-    model = found.final.model
-    keys = []
-    for name in found.added:
-        for p in model.library[name].parameters:
-            key = f"{name}.{p.name}"
-            low, high = model.entry(key).bounds or p.bounds
-            near = 1e-6 * max(abs(p.default), 1e-12)
-            if p.null is None and p.free and not low + near < model.value(key) < high - near:
-                keys.append(key)
-    return keys
+def strained(result: SearchResult) -> bool:
+    """Whether shape parameters of effects added ended at a bound: the law had to be bent to its limits to fit."""
+    model = result.final.model
+    keys = [
+        f"{name}.{p.name}" for name in result.added for p in model.library[name].parameters if p.null is None and p.free
+    ]
+    return bool(Parameters.of(model, keys).at_bound)
 
 
-def same_as(name: str, rivals: Mapping[str, Sequence[Rival]], family: Mapping[str, Sequence[str]] | None) -> list[str]:
-    """What cannot be told from an effect that was found: by the errors, or by the channels."""
-    tied = [r.name for r in rivals.get(name, ()) if not r.told_apart]
-    return list(dict.fromkeys([*tied, *(family or {}).get(name, ())]))
+def place(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str | None:
+    """The subsystem of the first effect added, or of the curve that explains most of what no effect does."""
+    if verdict.kind == OUTSIDE:
+        return curves[0].subsystem if curves else None
+    return subsystem(result.model.library[result.added[0]]) if result.added else None
 
 
-def sentences(
-    found: Found,
-    rivals: Mapping[str, Sequence[Rival]],
-    kind: str,
-    shapes: Sequence[Shape],
-    family: Mapping[str, Sequence[str]] | None = None,
-) -> str:
+def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
     """What a user reads first."""
-    base, final = found.base.level.rms_held_out, found.final.level.rms_held_out
-    fell = f"On held-out data the residual went from {base:.3g} to {final:.3g} times the noise."
-    if kind == COMPLETE:
+    base, final = result.base.misfit.rms_validation, result.final.misfit.rms_validation
+    fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
+    if verdict.kind == COMPLETE:
         return (
-            f"Complete: on held-out data the residual is {final:.3g} times the noise, and no effect of the library "
-            "lowers it by more than chance."
+            f"Complete: on validation data the residual is {final:.3g} × noise, and no effect of the library lowers it "
+            "by more than chance."
         )
-    if kind == MISSING:
-        return f"Missing: {_and(found.added)}. {fell} {_why_not(found, rivals)}".strip()
-    if kind == TIED:
+    if verdict.kind == MISSING:
+        return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict)])
+    if verdict.kind == INDISTINGUISHABLE:
         parts = []
-        for name in found.added:
-            same = same_as(name, rivals, family)
+        for name in result.added:
+            same = verdict.indistinguishable_from(name)
             parts.append(f"one of {{{', '.join([name, *same])}}}" if same else name)
-        why = " Pressures would: without them these act alike on the position." if family else ""
-        return (
-            f"Missing: {_and(parts)}; these data cannot tell {'them' if len(parts) == 1 else 'all'} apart. {fell}{why}"
-        )
-    text = "Outside the library: something is left that no effect of it explains. "
-    if found.added:
-        text += f"The nearest is {_and(found.added)}. {fell} "
+        why = " Pressures would: without them these act alike on the position." if verdict.family else ""
+        return f"Missing: {_and(parts)}. These data cannot distinguish them. {fell}{why}"
+    text = "Outside the library: no effect of it explains what is left. "
+    if result.added:
+        text += f"The nearest is {_and(result.added)}. {fell} "
     else:
-        text += f"On held-out data the residual is {final:.3g} times the noise. "
-    if shapes:
-        best = shapes[0]
-        text += (
-            f"It looks like {best.summary} over {best.variable.replace('_', ' ')}, which would explain "
-            f"{100 * best.share:.0f} % of what is left."
-        )
+        text += f"On validation data the residual is {final:.3g} × noise. "
+    if curves:
+        best = curves[0]
+        over = f"{best.summary} over {best.variable.replace('_', ' ')}"
+        text += f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
     return text.strip()
 
 
@@ -134,26 +159,17 @@ def imitated(records: Sequence[Record]) -> list[str]:
 
 
 def warning(named: Sequence[str], imitations: Sequence[str]) -> str:
-    """What to look at before the hydraulics are blamed; empty where nothing is imitated."""
+    """What to look at before the hydraulics are suspected; empty where nothing is imitated."""
     both = [name for name in named if name in imitations]
-    if both:
-        return (
-            f" The devices on the bus are set so that they imitate {_and(both)}: read those settings first (inspect)."
-        )
-    if imitations:
-        return f" The devices on the bus are set so that they imitate {_and(list(imitations))}."
-    return ""
+    if not imitations:
+        return ""
+    more = ": read those settings first (inspect)" if both else ""
+    return f" The devices on the bus are set so that they imitate {_and(both or list(imitations))}{more}."
 
 
-def _why_not(found: Found, rivals: Mapping[str, Sequence[Rival]]) -> str:
-    parts = []
-    for name in found.added:
-        if rivals.get(name):
-            second = rivals[name][0]
-            parts.append(
-                f"Why not {second.name} for {name}: with it {second.level.rms_held_out:.3g} times the noise are left."
-            )
-    return " ".join(parts)
+def _instead(verdict: Verdict) -> list[str]:
+    best = {name: verdict.competing[name][0] for name in verdict.added if verdict.competing.get(name)}
+    return [f"{c.name} instead of {name} leaves {c.misfit.rms_validation:.3g} × noise." for name, c in best.items()]
 
 
 def _and(words: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""The search: all movements on all rivals, the best sequence of them by exchange, then finer numbers."""
+"""The search: all movements on all models, the best sequence of them by exchange, then finer numbers."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A movement within the limits, and what it tells."""
+class JudgedMovement:
+    """A movement within the limits, and what it shows."""
 
     movement: Movement
     evidence: Evidence
@@ -39,8 +39,8 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Search:
-    """Rivals, limits, noise and bench of one search. ``first``: how many points are the rivals as fitted."""
+class MovementSearch:
+    """Models, limits, noise and bench of one search. ``first``: how many points are the models as fitted."""
 
     points: Sequence[Point]
     first: int
@@ -53,10 +53,10 @@ class Search:
     def pairs(self) -> list[Pair]:
         return pairs(self.points, self.first)
 
-    def candidates(self, say: Say) -> list[Candidate]:
+    def candidates(self, say: Say) -> list[JudgedMovement]:
         """Every movement that can be made to keep the limits. Raises `NextExperimentError` if there is none."""
         allowed: list[tuple[Movement, str]] = []
-        found: list[Candidate] = []
+        found: list[JudgedMovement] = []
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
             say("movements within the limits")
             for one in pool.map(self.within, every()):
@@ -68,13 +68,13 @@ class Search:
                     found.append(judged)
         if not found:
             raise NextExperimentError(
-                "no movement keeps the limits on every rival, however small: "
+                "no movement keeps the limits on every model, however small: "
                 f"drive {self.limits.drive:g} V, travel {self.limits.travel:g} m, velocity {self.limits.velocity:g} "
                 f"m/s, pressures {self.limits.pressure_min:g} to {self.limits.pressure_max:g} Pa"
             )
         return found
 
-    def again(self, found: Sequence[Candidate], say: Say) -> list[Candidate]:
+    def again(self, found: Sequence[JudgedMovement], say: Say) -> list[JudgedMovement]:
         """The most telling of candidates that were judged at fewer points, judged at all of this search."""
         points = max(i for i in found[0].evidence.information) + 1
         old = replace(self, points=self.points[:points])
@@ -101,7 +101,7 @@ class Search:
         return None
 
     def largest_part(self, movement: Movement) -> tuple[float, str]:
-        """The largest part of a limit that any rival uses, and of which. Raises `SimulationError`."""
+        """The largest part of a limit that any model uses, and of which. Raises `SimulationError`."""
         lead = self.points[0]
         played = play(lead.plant, Leader.of(lead.model), [movement], self.bench)
         worst, limit = 0.0, ""
@@ -109,13 +109,13 @@ class Search:
             start = point.plant.initial_state(position=self.bench.centre)
             run = point.plant.simulate(played.drive, 1.0 / self.bench.rate, start)
             rest = (float(run.pressure_a[0]), float(run.pressure_b[0]))
-            for name, part in used(self.limits, extremes(point.rival, run), rest, self.bench.centre).items():
+            for name, part in used(self.limits, extremes(point.name, run), rest, self.bench.centre).items():
                 if part > worst:
                     worst, limit = part, name
         return worst, limit
 
-    def judged(self, movement: Movement, reason: str = "") -> Candidate | None:
-        """What the movement tells; None where a rival cannot follow."""
+    def judged(self, movement: Movement, reason: str = "") -> JudgedMovement | None:
+        """What the movement shows; None where a model cannot follow."""
         lead = self.points[0]
         try:
             played = play(lead.plant, Leader.of(lead.model), [movement], self.bench)
@@ -123,13 +123,13 @@ class Search:
                 movement.kind, played.trajectory, 1.0 / self.bench.rate, list(self.noise),
                 lead.model.value("spool_travel"),
             )  # fmt: skip
-            return Candidate(movement, evidence(self.points, self.pairs, record, self.noise, self.length), reason)
+            return JudgedMovement(movement, evidence(self.points, self.pairs, record, self.noise, self.length), reason)
         except SimulationError:
             return None
 
-    def best(self, found: Sequence[Candidate], places: int) -> list[Candidate]:
+    def best(self, found: Sequence[JudgedMovement], places: int) -> list[JudgedMovement]:
         """The best sequence of so many movements: one by one, then each exchanged while that helps."""
-        chosen: list[Candidate] = []
+        chosen: list[JudgedMovement] = []
         for _ in range(places):
             chosen.append(max(found, key=lambda c: self.score([*chosen, c])))
         for _ in range(_PASSES):
@@ -141,7 +141,7 @@ class Search:
                 break
         return chosen
 
-    def refined(self, chosen: list[Candidate], say: Say) -> list[Candidate]:
+    def refined(self, chosen: list[JudgedMovement], say: Say) -> list[JudgedMovement]:
         """The sequence with finer numbers, place by place (Nelder-Mead in the logarithms)."""
         chosen = list(chosen)
         for place in range(len(chosen)):
@@ -149,14 +149,14 @@ class Search:
             chosen[place] = self._finer(chosen[:place] + chosen[place + 1 :], chosen[place])
         return chosen
 
-    def score(self, chosen: Sequence[Candidate]) -> float:
+    def score(self, chosen: Sequence[JudgedMovement]) -> float:
         """The larger the better; the pair that is closest counts most."""
         total = chosen[0].evidence
         for other in chosen[1:]:
             total = total + other.evidence
         return -sum(1.0 / (1.0 + left) for left in total.left(self.points).values())
 
-    def _finer(self, others: list[Candidate], one: Candidate) -> Candidate:
+    def _finer(self, others: list[JudgedMovement], one: JudgedMovement) -> JudgedMovement:
         family = one.movement.family
         names = [n for n in family.ranges if n != "cycles"]
         signs = {n: math.copysign(1.0, one.movement.numbers[n]) for n in names}

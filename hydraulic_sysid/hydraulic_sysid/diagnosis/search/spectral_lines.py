@@ -2,43 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation.noise import code_step
-from hydraulic_sysid.estimation.segments import Pieces
+from hydraulic_sysid.estimation.segments import Segments
 
-from .anchor import Anchor
-from .candidates import Hints
-
-Array = NDArray[np.float64]
+from .candidates import RecordFeatures
+from .linearisation import Linearisation
 
 STANDS_OUT = 30.0  # power of a line over the median around it
 _AROUND = 201  # bins
 _FINER = 4  # zero padding: bins between those of a record
 _BESIDE = 3.0  # Hz, within which side bands of a line lie
 _MOST = 2
-_SLOWEST = 2.0  # Hz, slower is drift within a piece
+_SLOWEST = 2.0  # Hz, slower is drift within a segment
 
 
-def hints(anchor: Anchor) -> Hints:
+def record_features(at: Linearisation) -> RecordFeatures:
     """Lines, and the step between position readings that all records share (0 where they have none)."""
-    steps = [code_step(p.record["position"]) for p in anchor.split.pieces]
+    steps = [code_step(s.record["position"]) for s in at.split.segments]
     shared = float(np.median(steps)) if max(steps) < 1.01 * min(steps) else 0.0
-    return Hints(spectral_lines(anchor), shared)
+    return RecordFeatures(spectral_lines(at.split.segments, at.residual), shared)
 
 
-def spectral_lines(anchor: Anchor) -> tuple[float, ...]:
-    """The strongest lines [Hz], at most two. Records shorter than a second show none.
+def spectral_lines(segments: Sequence[Segments], residuals: Sequence[Array]) -> tuple[float, ...]:
+    """The strongest lines [Hz] of residuals (S, m) per record, at most two. Records shorter than a second show none.
 
     What is periodic in the plant acts through a valve that reverses: of a line that leaves side bands, often higher
     than itself. They fall together again where the residual is turned over with the drive, and each record has its own;
     so the line is where the residual and the turned one, of all records, stand out most.
     """
-    spectra = [found for found in map(_spectrum, anchor.split.pieces, anchor.residual) if found is not None]
+    spectra = [found for found in map(_spectrum, segments, residuals) if found is not None]
     peaks = sorted(((float(s.clear.max()), float(s.frequency[np.argmax(s.clear)])) for s in spectra), reverse=True)
     distinct: list[float] = []
     for height, at in peaks:
@@ -62,16 +61,15 @@ class _Spectrum:
     ratio: Array
 
 
-def _spectrum(pieces: Pieces, residual: Array) -> _Spectrum | None:
-    values = residual[:, : -len(pieces.free)].reshape(len(pieces.starts), pieces.samples, len(pieces.channels))
-    run = values[:, :-1].reshape(-1, len(pieces.channels)).astype(float)
+def _spectrum(segments: Segments, residual: Array) -> _Spectrum | None:
+    run = segments.by_channel(residual)[:, :-1].reshape(-1, len(segments.channels))
     if len(run) < 5 * _AROUND:
         return None
-    drive = pieces.record["drive"][pieces.starts[:, None] + np.arange(pieces.samples - 1)].reshape(-1)
+    drive = segments.record["drive"][segments.first[:, None] + np.arange(segments.samples - 1)].reshape(-1)
     way = np.sign(drive)
     way = way - way.mean()
     way /= max(float(np.sqrt(np.mean(way**2))), 1e-9)
-    frequency: Array = np.fft.rfftfreq(_FINER * len(run), pieces.record.dt).astype(np.float64)
+    frequency: Array = np.fft.rfftfreq(_FINER * len(run), segments.record.dt).astype(np.float64)
     plain, turned = _power(run), _power(run * way[:, None])
     around = np.repeat(np.asarray(median_filter(plain[::_FINER], _AROUND), dtype=float), _FINER)[: len(plain)]
     within = frequency > _SLOWEST

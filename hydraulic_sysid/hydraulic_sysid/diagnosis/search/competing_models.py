@@ -1,0 +1,61 @@
+"""What else could be meant: models with another effect in the place of one, and whether these data distinguish them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+from hydraulic_sim.plant import Plant
+
+from .linearisation import Linearisation
+from .misfit import Misfit
+from .search import SearchState
+
+DISTINCT = 30.0  # difference of the sums of squares, of the variance, that distinguishes two models …
+LAW = 0.05  # … beside this share of what the better one leaves: no law is quite that of the bench
+_MOST = 5
+
+
+@dataclass(frozen=True)
+class CompetingModel:
+    """A model with the effect ``name`` in another's place. ``distinguishable``: whether the data decide against it.
+
+    ``difference``: how much larger its sum of squares is; ``collinearity``: cosine between what the two effects change
+    in the residuals beyond all free parameters; 1: the same.
+    """
+
+    name: str
+    model: Model
+    misfit: Misfit
+    difference: float
+    distinguishable: bool
+    collinearity: float
+
+
+def competing_models(name: str, without: SearchState, final: Misfit) -> list[CompetingModel]:
+    """The competitors of ``name``, whose place in the fitted model is empty in ``without``; the closest first."""
+    own = next((r.refit.model for r in without.refits if r.name == name), None)
+    needed = DISTINCT * final.variance + LAW * final.excess
+    found = []
+    for other in without.others(name)[:_MOST]:
+        difference = other.misfit.total - final.total
+        cosine = _collinearity(without.linearisation, own, other.refit.model)
+        model = other.refit.model
+        found.append(CompetingModel(other.name, model, other.misfit, difference, difference > needed, cosine))
+    return found
+
+
+def _collinearity(at: Linearisation, one: Model | None, other: Model) -> float:
+    """Of what two models' effects, at their fitted sizes, change in the residuals, all else being as it is."""
+    if one is None:
+        return float("nan")
+    try:
+        columns = at.changes([Plant(m).with_parameters(at.parameters.by_key) for m in (one, other)])
+    except SimulationError:
+        return float("nan")
+    information = at.bordered(columns).marginal(len(at.parameters)).information
+    size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    return float(np.clip(abs(information[0, 1]) / (size[0] * size[1]), 0.0, 1.0))

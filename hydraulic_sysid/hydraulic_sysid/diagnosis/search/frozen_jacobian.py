@@ -1,0 +1,175 @@
+"""Quick refits of a model with a candidate switched on, by a frozen Jacobian.
+
+The sensitivities to the model's own parameters and to the initial states are those of the linearisation throughout:
+only the candidate's are taken anew in every step. A step that does not lower the sum of squares is damped, so that what
+is approximate costs steps and not truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array, Mask
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations, minimise
+from hydraulic_sysid.estimation.parameters import Parameters
+
+from .candidates import between
+from .linearisation import Linearisation
+
+_FLAT = 2e-4  # relative gain of a step that ends the refit
+_MOST_STEPS = 10
+_SHARES = (1.0, 0.5, 0.2, 0.05)  # of the predicted size, to start from
+_ROUNDS = 2  # times that initial states are moved at the end
+_ROUNDED = 6  # the same where what is measured is rounded, and the sensitivities only point the way
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A model refitted: ``costs[i]`` (S_i,) sums of squares of every segment, and, of `as_it_is`, ``residual[i]``
+    (S_i, m): what is left."""
+
+    model: Model
+    costs: list[Array]
+    residual: Sequence[Array] = ()
+
+
+def refit(at: Linearisation, model: Model, start: Mapping[str, float]) -> Refit:
+    """Fit ``model``, which has the linearisation's effects and more, from its values and ``start`` [SI, by key]."""
+    own = tuple(k for k in start if model.entry(k).free)
+    begin = _begin(at, model, start, own)
+    if begin is None:
+        return Refit(model, at.costs)
+    point = minimise(begin, _MOST_STEPS, _FLAT).point
+    values = {**start, **point.parameters.by_key}
+    return Refit(model.with_values(values, source="fitted"), point.at_rest(_ROUNDS).costs)
+
+
+def as_it_is(at: Linearisation, model: Model) -> Refit:
+    """``model``, which has the linearisation's effects and more, with the values it has."""
+    none = Parameters.of(model, ())
+    point = FrozenPoint.at(at, Plant(model), none, at.point.initial_states)
+    if point is None:
+        return Refit(model, at.costs, at.residual)
+    rested = point.at_rest(_ROUNDED)
+    return Refit(model, rested.costs, rested.raw)
+
+
+def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Sequence[str]) -> FrozenPoint | None:
+    """Where to start: as far towards the prediction as lowers the sum of squares."""
+    plant = Plant(model).with_parameters(dict(start))
+    predicted = Parameters.of(model, own)
+    values = np.array([start[k] for k in own])
+    predicted = replace(predicted, values=np.clip(values, predicted.low, predicted.high))
+    records = [model.parameter(k) for k in own]
+    before = sum(float(c[f].sum()) for c, f in zip(at.costs, at.split.fit, strict=True))
+    found = None
+    for share in _SHARES:
+        tried = [
+            v if r.null is None else between(r.null, v, share, r.default)
+            for r, v in zip(records, predicted.values.tolist(), strict=True)
+        ]
+        candidate = replace(predicted, values=np.array(tried))
+        found = FrozenPoint.at(at, plant, at.parameters + candidate, at.point.initial_states)
+        if found is not None and found.cost < before:
+            break
+    return found
+
+
+@dataclass(frozen=True)
+class FrozenPoint:
+    """Where a quick refit stands.
+
+    ``plant``: with the candidate; ``parameters``: the linearisation's and the candidate's; ``raw[i]`` (S, m): residuals
+    of record i from these ``initial_states``.
+    """
+
+    linearisation: Linearisation
+    plant: Plant
+    parameters: Parameters
+    initial_states: list[Array]
+    raw: list[Array]
+
+    @classmethod
+    def at(
+        cls, linearisation: Linearisation, plant: Plant, parameters: Parameters, initial_states: list[Array]
+    ) -> FrozenPoint | None:
+        """None where the plant does not run."""
+        located = plant.with_parameters(parameters.by_key)
+        try:
+            raw = linearisation.point.shooting.residuals(located, initial_states)
+        except SimulationError:
+            return None
+        finite = all(np.isfinite(r).all() for r in raw)
+        return cls(linearisation, plant, parameters, initial_states, raw) if finite else None
+
+    @cached_property
+    def residual(self) -> list[Array]:
+        """(S, m) per record without what other initial states would explain."""
+        raw = [r[..., None] for r in self.raw]
+        return [r[..., 0] for r in self.linearisation.point.beyond(raw)]
+
+    @cached_property
+    def costs(self) -> list[Array]:
+        """(S,) per record: sum of squares of each segment."""
+        return [np.sum(r**2, axis=1) for r in self.residual]
+
+    @cached_property
+    def cost(self) -> float:
+        """Sum of squares of the segments for fitting."""
+        return sum(float(c[f].sum()) for c, f in zip(self.costs, self.linearisation.split.fit, strict=True))
+
+    @cached_property
+    def own_columns(self) -> list[Array]:
+        """Change of the residuals (S, m, Q) with each of the candidate's parameters over its scale, per record."""
+        own = self.parameters.after(len(self.linearisation.parameters))
+        plant = self.plant.with_parameters(self.parameters.by_key)
+        return self.linearisation.point.shooting.jacobian(plant, own, self.initial_states, self.raw)
+
+    @cached_property
+    def normal(self) -> NormalEquations | None:
+        """None where the candidate's parameters cannot be moved."""
+        try:
+            return self.linearisation.bordered(self.own_columns, self.residual)
+        except SimulationError:
+            return None
+
+    def moved(self, change: Array) -> FrozenPoint | None:
+        """A change (P,) of the parameters away; initial states follow to where they will fit best, to first order."""
+        frozen = len(self.linearisation.parameters)
+        ahead = [
+            r + old @ change[:frozen] + new @ change[frozen:]
+            for r, old, new in zip(self.raw, self.linearisation.columns, self.own_columns, strict=True)
+        ]
+        return self._from(self.parameters.moved(change), ahead)
+
+    def at_rest(self, rounds: int) -> FrozenPoint:
+        """The same parameters, every segment from the best of a few initial states."""
+        point = self
+        for _ in range(rounds):
+            again = point._from(point.parameters, point.raw)
+            if again is None:
+                break
+            better = [(new < old)[:, None] for new, old in zip(again.costs, point.costs, strict=True)]
+            point = replace(
+                point,
+                initial_states=_chosen(better, again.initial_states, point.initial_states),
+                raw=_chosen(better, again.raw, point.raw),
+            )
+        return point
+
+    def _from(self, parameters: Parameters, residuals: Sequence[Array]) -> FrozenPoint | None:
+        """From the initial states that these residuals ask for."""
+        at = self.linearisation.point
+        states = at.shooting.corrected(self.initial_states, at.projections, residuals)
+        return FrozenPoint.at(self.linearisation, self.plant, parameters, states)
+
+
+def _chosen(better: Sequence[Mask], new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
+    return [np.where(b, n, o) for b, n, o in zip(better, new, old, strict=True)]

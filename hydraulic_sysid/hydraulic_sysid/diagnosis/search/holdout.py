@@ -1,0 +1,61 @@
+"""Records cut into segments, and which of them are for fitting, which for validation.
+
+Where no validation records are named, every third block of a few segments of every record is for validation, so that
+both have seen the same experiments; segments for validation never enter a fit, but they steer what is added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydraulic_sim.arrays import Index, Mask
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.estimation.segments import Segments, cut
+
+BLOCK = 3  # segments in a row that have the same role
+EVERY = 3  # one block in so many is for validation
+
+
+@dataclass(frozen=True)
+class Split:
+    """All segments, and per record which are for fitting: ``fit[i]`` (S_i,) of ``segments[i]``."""
+
+    segments: list[Segments]
+    fit: list[Mask]
+
+    @property
+    def to_fit(self) -> list[Segments]:
+        """The segments that a fit sees, without records of which it sees none."""
+        return [s.subset(f) for s, f in zip(self.segments, self.fit, strict=True) if f.any()]
+
+    def records(self, validation: bool = False) -> list[Record]:
+        """Those of which at least a part is fitted, or those that are named for ``validation``."""
+        return [s.record for s, f in zip(self.segments, self.fit, strict=True) if bool(f.any()) != validation]
+
+    @property
+    def channels(self) -> list[str]:
+        """All that are fitted in any record."""
+        return list(dict.fromkeys(c for s in self.segments for c in s.channels))
+
+
+def split(records: Sequence[Record], validation: Sequence[Record], plant: Plant, length: float) -> Split:
+    """Cut ``records`` and those for ``validation`` into segments of ``length`` seconds.
+
+    :raises hydraulic_sysid.estimation.errors.SegmentError: a record cannot be cut.
+    """
+    segments = cut(records, plant, length) + cut(validation, plant, length)
+    if validation:
+        return Split(segments, [np.full(len(s), i < len(records)) for i, s in enumerate(segments)])
+    # Shifted from record to record, so that not always the same phase of an experiment is for validation.
+    return Split(segments, [_alternate(np.arange(len(s)), i) for i, s in enumerate(segments)])
+
+
+def _alternate(number: Index, shift: int) -> Mask:
+    """Which segments of one record are for fitting; a record of very few is fitted whole."""
+    if number.size >= EVERY * BLOCK:
+        return (number // BLOCK + shift) % EVERY != EVERY - 1
+    return number % EVERY != EVERY - 1 if number.size >= EVERY else np.ones(number.size, dtype=bool)

@@ -1,0 +1,82 @@
+"""How far off a model is, on segments for fitting and for validation, and when a reduction is one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hydraulic_sim.arrays import Array
+
+from .holdout import Split
+
+SIGNIFICANT = 25.0  # reduction of the sum of squares, of the present variance, on segments for fitting …
+CONFIRMED = 10.0  # … and on those for validation
+VISIBLE = 5e-4  # over all residuals, of their present variance: a smaller one is a matter of laws, not of effects
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Sums of squares over noise on segments for fitting and for validation, and how many free values they are of."""
+
+    fit: float
+    validation: float
+    n_fit: int
+    n_validation: int
+
+    @property
+    def rms_fit(self) -> float:
+        """Residual over noise on the segments fitted."""
+        return float((self.fit / max(self.n_fit, 1)) ** 0.5)
+
+    @property
+    def rms_validation(self) -> float:
+        """Residual over noise on what no fit has seen (on the segments fitted where there is nothing else)."""
+        return float((self.validation / self.n_validation) ** 0.5) if self.n_validation else self.rms_fit
+
+    @property
+    def count(self) -> int:
+        """Free values."""
+        return self.n_fit + self.n_validation
+
+    @property
+    def total(self) -> float:
+        """Sum of squares."""
+        return self.fit + self.validation
+
+    @property
+    def variance(self) -> float:
+        """Mean square over noise, at least 1."""
+        return max(1.0, self.total / max(self.count, 1))
+
+    @property
+    def excess(self) -> float:
+        """What of the sum of squares noise does not explain."""
+        return max(self.total - self.count, 0.0)
+
+    @property
+    def least(self) -> float:
+        """The smallest reduction of the sum of squares that counts."""
+        return max(SIGNIFICANT, VISIBLE * self.count) * self.variance
+
+
+def misfit(split: Split, costs: Sequence[Array]) -> Misfit:
+    """Of the sums of squares ``costs[i]`` (S_i,); each initial state takes its degrees of freedom."""
+    sums, counts = [0.0, 0.0], [0, 0]
+    for segments, fit, cost in zip(split.segments, split.fit, costs, strict=True):
+        for i, part in enumerate((fit, ~fit)):
+            sums[i] += float(cost[part].sum())
+            counts[i] += int(part.sum()) * segments.samples * len(segments.channels)
+    return Misfit(sums[0], sums[1], counts[0], counts[1])
+
+
+def material(before: Misfit, after: Misfit) -> bool:
+    """Whether a reduction is more than chance, more than fitting itself gives, and enough to be seen."""
+    if before.total - after.total < before.least:
+        return False
+    held = not before.n_validation or before.validation - after.validation > CONFIRMED * before.variance
+    return held and before.fit - after.fit > SIGNIFICANT * before.variance
+
+
+def explained(before: Misfit, after: Misfit) -> float:
+    """Share of what noise does not explain that has gone."""
+    return (before.total - after.total) / max(before.excess, 1e-9 * before.total, before.total - after.total)

@@ -1,0 +1,22 @@
+"""An error of the pressure transducers of any shape.
+
+    y = p + height*hat(z)
+
+Of either one over its own reading, or of both over time.
+"""
+
+from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
+
+VARIABLES = ("pressure_a", "pressure_b", "time")
+
+
+def add(reading_a, reading_b, t, over, centre, width, height):
+    z = (reading_a, reading_b, t)[int(over)]
+    hat = 1.0 - abs(z - centre) / width
+    error = height * hat if hat > 0.0 else 0.0
+    a = error if over != 1.0 else 0.0
+    b = error if over != 0.0 else 0.0
+    return reading_a + a, reading_b + b
+
+
+EFFECT = effect("pressure_sensor", add, "Pa", size=1e4, most=1e9, order=96)

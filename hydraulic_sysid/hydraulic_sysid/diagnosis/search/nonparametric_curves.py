@@ -1,0 +1,140 @@
+"""What no library effect explains, as a curve without a law over the variable that explains most.
+
+At every place of the plant where something may be added (`nonparametric`), and over every variable there, a curve of
+linear B-splines is fitted to the residual: by the sensitivities to its coefficients beyond those of the free
+parameters, so that the dynamics between the missing effect and the sensors is that of the
+model and nothing is differentiated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array
+from hydraulic_sim.effect import Effect
+from hydraulic_sim.errors import ModelError, SimulationError
+from hydraulic_sim.plant import Plant
+
+from .candidates import subsystem
+from .linearisation import Linearisation
+from .nonparametric import FILES
+from .score_test import ENOUGH
+
+KNOTS = 9
+_RIDGE = 1e-6  # of the largest diagonal: knots that nothing visits
+_VISITED = 1e-3  # of the largest information: a knot below is not shown
+_RANGE = (0.005, 0.995)  # quantiles between which knots are laid
+_WIDTH = 1.96  # standard errors on either side of a 95 % band
+
+
+@dataclass(frozen=True)
+class NonparametricCurve:
+    """A curve: ``value`` (K,) ± ``error`` [``unit``] at ``knots`` (K,) [the variable's unit].
+
+    ``reduction``: of the sum of squares on the segments looked at; ``share``: of what noise does not explain there.
+    """
+
+    place: str
+    subsystem: str
+    summary: str
+    variable: str
+    unit: str
+    reduction: float
+    share: float
+    knots: Array
+    value: Array
+    error: Array
+
+
+def nonparametric_curves(at: Linearisation, say: Callable[[str], None]) -> list[NonparametricCurve]:
+    """All curves, the one that explains most first. Empty for a plant that takes none of them."""
+    part, _ = at.sample(ENOUGH)
+    model = replace(part.model, user_effects=(*part.model.user_effects, *FILES))
+    seen = _seen(part)
+    found: list[NonparametricCurve] = []
+    for file in FILES:
+        try:
+            extended = model.with_effect(file.stem)
+            extended.check_complete()
+        except ModelError:  # the plant has no such stage
+            continue
+        plant = Plant(extended).with_parameters(at.parameters.by_key)
+        effect = model.library[file.stem]
+        say(f"curve of {effect.summary}")
+        for number, variable in enumerate(effect.kernel.__globals__["VARIABLES"]):
+            if variable in seen:
+                curve = _curve(part, plant, effect, number, variable, seen[variable])
+                found += [curve] if curve is not None else []
+    return sorted(found, key=lambda c: -c.reduction)
+
+
+def _seen(at: Linearisation) -> dict[str, Array]:
+    """Values that the variables take in the records."""
+    segments = at.split.segments
+    smoothed = np.concatenate([s.smoothed for s in segments])
+    position, velocity, pressure_a, pressure_b = smoothed.T
+    limit = at.model.value("drive_limit")
+    opening = np.concatenate([np.clip(s.record["drive"] / limit, -1.0, 1.0) for s in segments])
+    values = {
+        "position": position,
+        "reading": position,
+        "velocity": velocity,
+        "speed": np.abs(velocity),
+        "opening": opening,
+        "size_of_opening": np.abs(opening),
+        "time": np.concatenate([np.arange(len(s.record)) * s.record.dt for s in segments]),
+    }
+    if np.isfinite(smoothed).all():
+        difference = pressure_a - pressure_b
+        values |= {"pressure_a": pressure_a, "pressure_b": pressure_b, "mean_pressure": 0.5 * (pressure_a + pressure_b)}
+        values |= {"pressure_difference": difference, "size_of_pressure_difference": np.abs(difference)}
+    return values
+
+
+def _curve(
+    at: Linearisation, plant: Plant, effect: Effect, number: int, variable: str, values: Array
+) -> NonparametricCurve | None:
+    low, high = (float(np.quantile(values, q)) for q in _RANGE)
+    if not high - low > 1e-9 * max(abs(low), abs(high), 1e-12):
+        return None
+    knots: Array = np.linspace(low, high, KNOTS, dtype=np.float64)
+    height = next(p for p in effect.parameters if p.name == "height")
+    hats = [
+        {"over": float(number), "centre": float(z), "width": float(knots[1] - knots[0]), "height": height.default}
+        for z in knots
+    ]
+    every = [{"height": 0.0}, *hats]
+    try:
+        changed = at.changes(
+            [plant.with_parameters({f"{effect.name}.{k}": v for k, v in hat.items()}) for hat in every]
+        )
+    except SimulationError:
+        return None
+    normal = at.bordered([c[..., 1:] - c[..., :1] for c in changed]).marginal(len(at.parameters))
+    visited = np.diag(normal.information)
+    ridge = _RIDGE * float(visited.max())
+    if not ridge > 0.0:
+        return None
+    inverse = np.linalg.inv(normal.information + ridge * np.eye(KNOTS))
+    value = -inverse @ normal.gradient
+    reduction = normal.reduction(value)
+    total = sum(float(c.sum()) for c in at.costs)
+    noise = sum(float(r.size) - s.free.size * len(s) for r, s in zip(at.residual, at.split.segments, strict=True))
+    spread = max(1.0, np.sqrt(total / sum(r.size for r in at.residual)))
+    error = np.sqrt(np.maximum(np.diag(inverse), 0.0)) * spread
+    shown = visited > _VISITED * float(visited.max())
+    return NonparametricCurve(
+        effect.name,
+        subsystem(effect),
+        effect.summary,
+        variable,
+        height.unit,
+        reduction,
+        min(reduction / max(total - noise, 1e-300), 1.0),
+        knots[shown],
+        value[shown] * height.default,
+        _WIDTH * error[shown] * height.default,
+    )

@@ -1,0 +1,103 @@
+"""How much each candidate would explain, from its sensitivities beyond those of the free parameters (score test).
+
+Rao, Proc. Cambridge Phil. Soc. 44 (1948): what a parameter not yet fitted gains follows from residuals and
+sensitivities at the present fit alone. Here with the bounds of all parameters, and at probes of finite size, as many
+effects have no derivative at their null value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array
+from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.estimation.levenberg_marquardt import bounded_step
+from hydraulic_sysid.estimation.parameters import Parameters
+
+from .candidates import LARGE, SIZES, Probe, RecordFeatures, between, inverse, observed, probes
+from .linearisation import Linearisation
+
+ENOUGH = 50  # segments that do for a look, spread over all records
+
+
+@dataclass(frozen=True)
+class CandidateScore:
+    """A candidate and the best its probes predict: ``reduction`` of the sum of squares, and the values to ``start`` a
+    refit from [SI, by key]."""
+
+    effect: Effect
+    reduction: float
+    start: dict[str, float]
+
+
+def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures) -> list[CandidateScore]:
+    """All candidates, the best first; reductions of all segments for fitting, of which a sample is looked at."""
+    part, share = at.sample(ENOUGH)
+    found = [_score(part, effect, features) for effect in effects]
+    scaled = [replace(f, reduction=f.reduction / share) for f in found if f is not None]
+    return sorted(scaled, key=lambda f: -f.reduction)
+
+
+def _score(at: Linearisation, effect: Effect, features: RecordFeatures) -> CandidateScore | None:
+    plant = Plant(at.model.with_effect(effect.name))
+    for sizes in (SIZES, LARGE):
+        found = [_predict(at, plant, effect, group) for group in probes(effect, features, sizes)]
+        usable = [f for f in found if f is not None]
+        if usable:
+            return max(usable, key=lambda f: f.reduction)
+    return None
+
+
+def _predict(at: Linearisation, plant: Plant, effect: Effect, group: list[Probe]) -> CandidateScore | None:
+    try:
+        columns = at.changes([plant.with_parameters({**at.parameters.by_key, **p.values}) for p in group])
+    except SimulationError:
+        return None
+    start = dict(group[0].values)
+    if observed(effect):
+        return CandidateScore(effect, _as_observed(at, columns), start)
+    own = len(at.parameters)
+    normal = at.bordered(columns)
+    # What changes nothing by itself, as a damping where there is no spring, begins at its null value.
+    size = np.diag(normal.information)[own:]
+    usable = np.flatnonzero((size > 1e-12 * max(float(size.max()), 1e-300)) & (size >= 1e-6))
+    if not usable.size:
+        return None
+    group = [group[i] for i in usable]
+    normal = normal.subset(np.concatenate((np.arange(own), own + usable)))
+    # In units of the probes: 0 is the null value, 1 the probe.
+    reach = np.array([_reach(effect, p) for p in group])
+    units = Parameters(tuple(p.moved for p in group), np.zeros(usable.size), np.ones(usable.size), *reach.T)
+    change = bounded_step(normal, at.parameters + units)
+    alone = normal.subset(np.arange(own))
+    gain = normal.reduction(change) - alone.reduction(bounded_step(alone, at.parameters))
+    for p, amount in zip(group, change[own:].tolist(), strict=True):
+        start[p.moved] = between(p.null, p.values[p.moved], amount, _parameter(effect, p).default)
+    return CandidateScore(effect, gain, start)
+
+
+def _as_observed(at: Linearisation, change: list[Array]) -> float:
+    """What an effect gains whose size the records show: nothing is left to fit, and nothing to differentiate."""
+    raw = [p.raw[..., None] + c for p, c in zip(at.point.projections, change, strict=True)]
+    after = sum(float(np.sum(r**2)) for r in at.point.beyond(raw))
+    return sum(float(c.sum()) for c in at.costs) - after
+
+
+def _parameter(effect: Effect, probe: Probe) -> Parameter:
+    return next(p for p in effect.parameters if f"{effect.name}.{p.name}" == probe.moved)
+
+
+def _reach(effect: Effect, probe: Probe) -> tuple[float, float]:
+    """The parameter's bounds in units of the probe."""
+    parameter, value = _parameter(effect, probe), probe.values[probe.moved]
+    low, high = parameter.bounds
+    if inverse(probe.null, parameter.default):
+        return 0.0, value / low
+    span = value - probe.null
+    first, second = sorted(((low - probe.null) / span, (high - probe.null) / span))
+    return first, second

@@ -1,0 +1,243 @@
+"""Fits parameters within bounds and the initial state of every segment to records.
+
+The initial states are eliminated at every step (`projection`), which leaves a small bounded problem in the parameters
+(`levenberg_marquardt`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array, Mask
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+
+from .errors import CalibrationError
+from .levenberg_marquardt import Minimum, NormalEquations, minimise
+from .parameters import Parameters
+from .projection import Projection
+from .segments import Segments, cut
+from .shooting import Shooting
+
+_SETTLED = 1e-4  # share of the cost below which moving initial states on gains no more
+_ROUNDS = 4  # times that they are moved at most
+_NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured pressures go further
+_MILD = 3.0  # residual over noise from which a robust loss counts less than the square
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """What a user may choose about a fit."""
+
+    length: float = 0.5
+    """Seconds of a segment."""
+    robust: bool = False
+    """Let residuals beyond three times the noise count less (soft L1)."""
+    most_steps: int = 25
+    tolerance: float = 0.1
+    """The fit is done when another step would be shorter than this many standard errors."""
+    least_gain: float = 1e-6
+    """Or when a step lowers the sum of squares by no more than this share."""
+
+
+@dataclass(frozen=True)
+class FitPoint:
+    """Parameters and initial states of a fit, and what is left there. Nothing of it changes: a step gives another."""
+
+    shooting: Shooting
+    parameters: Parameters
+    initial_states: list[Array]
+    projections: list[Projection]
+    robust: bool = False
+
+    @classmethod
+    def begin(cls, plant: Plant, segments: Sequence[Segments], keys: Sequence[str], robust: bool = False) -> FitPoint:
+        """A model as it is, initial states moved once to where they fit best."""
+        shooting = Shooting(plant, segments)
+        point = cls(shooting, Parameters.of(plant.model, keys), shooting.initial_states, [], robust)
+        if any(s.unmeasured_pressures.any() for s in segments):
+            raw = shooting.residuals(point.plant, shooting.initial_states)
+            shooting = replace(shooting, misfit=_misfit(segments, raw))
+        return point.settled(shooting, point.parameters)
+
+    @property
+    def plant(self) -> Plant:
+        """With the parameters of this point."""
+        return self.shooting.plant.with_parameters(self.parameters.by_key)
+
+    @cached_property
+    def cost(self) -> float:
+        """Sum of squared residuals over noise, or what a robust loss makes of them."""
+        return float(sum(np.sum(loss(p.residual, self.robust)) for p in self.projections))
+
+    @cached_property
+    def normal(self) -> NormalEquations:
+        """With the initial states eliminated."""
+        information = np.zeros((len(self.parameters), len(self.parameters)))
+        scores = []
+        for p, beyond in zip(self.projections, self.beyond(self.columns()), strict=True):
+            weighted = beyond * _weights(p.residual, self.robust)[..., None]
+            information += np.tensordot(weighted, beyond, axes=([0, 1], [0, 1]))
+            scores.append(np.einsum("smp,sm->sp", weighted, p.residual))
+        return NormalEquations(information, tuple(scores))
+
+    def columns(self) -> list[Array]:
+        """Derivatives (S, m, P) of the residuals by the parameters over their scales, per record."""
+        return self.shooting.jacobian(
+            self.plant, self.parameters, self.initial_states, [p.raw for p in self.projections]
+        )
+
+    def beyond(self, columns: Sequence[Array]) -> list[Array]:
+        """What of them the initial states cannot explain."""
+        return [p.beyond(c) for p, c in zip(self.projections, columns, strict=True)]
+
+    def settled(self, shooting: Shooting, parameters: Parameters) -> FitPoint:
+        """Other parameters, or another weight of the priors; initial states moved to where they then fit best."""
+        plant = shooting.plant.with_parameters(parameters.by_key)
+        return FitPoint(shooting, parameters, *shooting.settled(plant, self.initial_states), self.robust)
+
+    def moved(self, change: Array) -> FitPoint | None:
+        """A change (P,) of the parameters away; None where the plant does not run there."""
+        try:
+            return self.settled(self.shooting, self.parameters.moved(change))
+        except SimulationError:
+            return None
+
+    def reweighted(self) -> FitPoint:
+        """This point, or the same parameters with unmeasured pressures freer, where the model comes nearer."""
+        misfit = _misfit(self.shooting.segments, [p.residual for p in self.projections])
+        if misfit >= _NEARER * self.shooting.misfit:
+            return self
+        return self.settled(replace(self.shooting, misfit=misfit), self.parameters)
+
+    def at_rest(self) -> FitPoint:
+        """The same parameters, initial states moved on while that gains something."""
+        point = self
+        for _ in range(_ROUNDS):
+            again = point.reweighted()
+            if again is point:
+                again = point.settled(point.shooting, point.parameters)
+                if not again.cost < point.cost:
+                    break
+                if point.cost - again.cost < _SETTLED * point.cost:
+                    return again
+            point = again
+        return point
+
+    def subset(self, chosen: Sequence[Mask]) -> FitPoint:
+        """On the ``chosen[i]`` (S_i,) segments of every record alone, without records of which there are none."""
+        used = [(i, c) for i, c in enumerate(chosen) if c.any()]
+        return replace(
+            self,
+            shooting=replace(self.shooting, segments=[self.shooting.segments[i].subset(c) for i, c in used]),
+            initial_states=[self.initial_states[i][c] for i, c in used],
+            projections=[self.projections[i].subset(c) for i, c in used],
+        )
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where a fit ended."""
+
+    point: FitPoint
+    converged: bool
+    iterations: int
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted values by key [SI]."""
+        return self.point.parameters.by_key
+
+    @property
+    def cost(self) -> float:
+        """Sum of squared residuals over noise."""
+        return self.point.cost
+
+    @property
+    def rms(self) -> float:
+        """Residual over noise as the loss counts it; 1 for an exact model, 0.96 with the robust loss."""
+        return float(np.sqrt(self.cost / self._freedom))
+
+    @property
+    def spread(self) -> float:
+        """What a residual adds to the parameters' uncertainty: `rms`, outliers bounded where the loss is robust."""
+        if not self.point.robust:
+            return self.rms
+        residuals = [p.residual for p in self.point.projections]
+        return float(np.sqrt(sum(np.sum((_weights(r, True) ** 2 * r) ** 2) for r in residuals) / self._freedom))
+
+    @property
+    def _freedom(self) -> int:
+        """Each initial state takes one degree of freedom, and its prior gives it back."""
+        measured = sum(s.measured.size for s in self.point.shooting.segments)
+        return max(measured - len(self.point.parameters), 1)
+
+
+def fit(
+    model: Model,
+    records: Sequence[Record],
+    keys: Sequence[str],
+    settings: FitSettings | None = None,
+    progress: Callable[[int, float], None] | None = None,
+) -> Fit:
+    """Fit the parameters ``keys`` of a model to records. ``progress`` gets each step's number and residual over noise.
+
+    :raises CalibrationError: no records, or such as cannot be cut.
+    :raises hydraulic_sim.errors.SimulationError: the model does not run along a record.
+    """
+    settings = settings or FitSettings()
+    if not records:
+        raise CalibrationError("there is no record to calibrate on")
+    plant = Plant(model)
+    return fit_segments(plant, cut(records, plant, settings.length, settings.robust), keys, settings, progress)
+
+
+def fit_segments(
+    plant: Plant,
+    segments: Sequence[Segments],
+    keys: Sequence[str],
+    settings: FitSettings,
+    progress: Callable[[int, float], None] | None = None,
+) -> Fit:
+    """As `fit`, to segments that were cut before."""
+
+    def accepted(number: int, point: FitPoint) -> FitPoint:
+        if progress is not None:
+            progress(number, float(np.sqrt(point.cost / max(sum(p.raw.size for p in point.projections), 1))))
+        return point.reweighted()
+
+    begin = FitPoint.begin(plant, segments, keys, settings.robust)
+    if not keys:
+        return Fit(begin.at_rest(), True, 0)
+    found: Minimum[FitPoint] = minimise(
+        begin, settings.most_steps, settings.least_gain, settings.tolerance, accepted=accepted
+    )
+    return Fit(found.point, found.converged, found.iterations)
+
+
+def evaluate(model: Model, records: Sequence[Record], settings: FitSettings | None = None) -> Fit:
+    """Residuals of a model as it is: only the initial states of the segments are fitted."""
+    return fit(model, records, (), settings)
+
+
+def loss(residual: Array, robust: bool) -> Array:
+    """What each residual over noise counts: its square, or if ``robust`` less from about three on (soft L1)."""
+    if not robust:
+        return residual**2
+    return 2.0 * _MILD**2 * (np.sqrt(1.0 + (residual / _MILD) ** 2) - 1.0)
+
+
+def _weights(residual: Array, robust: bool) -> Array:
+    return 1.0 / np.sqrt(1.0 + (residual / _MILD) ** 2) if robust else np.ones_like(residual)
+
+
+def _misfit(segments: Sequence[Segments], residuals: Sequence[Array]) -> float:
+    """How many times the noise the model is off, at least 1."""
+    squares = sum(float(np.sum(s.by_channel(r) ** 2)) for s, r in zip(segments, residuals, strict=True))
+    return max(1.0, float(np.sqrt(squares / sum(s.measured.size for s in segments))))

@@ -1,0 +1,88 @@
+"""Which parameters a fit may move, how large each is, and how far it may go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array
+from hydraulic_sim.model import Model
+
+_SCATTER = 2.0  # factor by which a plant may be off a data sheet that states no bounds
+_AT_BOUND = 1e-6  # distance from a bound, of the scale
+
+
+def scale(model: Model, key: str) -> float:
+    """The size of a parameter: of its value, or of the library's default where that is larger.
+
+    Where both are 0, as an angle may be, a hundredth of its range.
+    """
+    parameter = model.parameter(key)
+    low, high = parameter.bounds
+    return max(abs(model.value(key)), abs(parameter.default)) or 0.01 * (high - low)
+
+
+def bounded(model: Model) -> Model:
+    """The model with bounds on free base parameters whose file gives none: half to twice their value.
+
+    While an effect is missing, a fit would else bend a mass or a flow to many times what a data sheet says.
+    """
+    for key in model.free_keys():
+        own = model.entries.get(key)
+        if "." not in key and own is not None and own.bounds is None and own.value > 0.0:
+            low, high = model.parameter(key).bounds
+            model = model.with_entry(key, bounds=(max(low, own.value / _SCATTER), min(high, own.value * _SCATTER)))
+    return model
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Parameters of a fit: ``values``, ``scales``, ``low`` and ``high`` bounds, each (P,), physical ones in SI."""
+
+    keys: tuple[str, ...]
+    values: Array
+    scales: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, model: Model, keys: Iterable[str]) -> Parameters:
+        """Parameters of a model as they are, within the model's bounds."""
+        keys = tuple(keys)
+        low, high = np.array([model.entry(k).bounds for k in keys], dtype=float).reshape(-1, 2).T
+        values = np.array([model.value(k) for k in keys], dtype=float)
+        return cls(keys, values, np.array([scale(model, k) for k in keys], dtype=float), low, high)
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+    def __add__(self, other: Parameters) -> Parameters:
+        mine, others = ((p.values, p.scales, p.low, p.high) for p in (self, other))
+        return Parameters(self.keys + other.keys, *(np.concatenate(pair) for pair in zip(mine, others, strict=True)))
+
+    def after(self, first: int) -> Parameters:
+        """Without the ``first`` ones."""
+        return Parameters(self.keys[first:], *(a[first:] for a in (self.values, self.scales, self.low, self.high)))
+
+    @property
+    def by_key(self) -> dict[str, float]:
+        """Key → value."""
+        return dict(zip(self.keys, self.values.tolist(), strict=True))
+
+    def moved(self, change: Array) -> Parameters:
+        """Changed by so many scales (P,), within the bounds."""
+        return replace(self, values=np.clip(self.values + change * self.scales, self.low, self.high))
+
+    @property
+    def reach(self) -> tuple[Array, Array]:
+        """How far (P,) each may go down and up, in its scale."""
+        return (self.low - self.values) / self.scales, (self.high - self.values) / self.scales
+
+    @property
+    def at_bound(self) -> dict[str, str]:
+        """Which are at a bound: key → "lowest" or "highest"."""
+        down, up = self.reach
+        found = {k: "highest" for k, u in zip(self.keys, up, strict=True) if u <= _AT_BOUND}
+        return found | {k: "lowest" for k, d in zip(self.keys, down, strict=True) if -d <= _AT_BOUND}
