@@ -27,7 +27,7 @@ from hydraulic_control.controller import Controller
 from hydraulic_control.evaluation import over_scatter
 from hydraulic_control.parameters import CONTROLLERS
 from hydraulic_control.response import Response, step_figures
-from hydraulic_control.session import Fault
+from hydraulic_control.session import Refusal
 from hydraulic_control.simulation import SensorNoise
 from hydraulic_control.tuning import Criteria
 
@@ -175,7 +175,7 @@ def listen(seconds: float) -> tuple[dict[str, float], str]:
     told = [row for row in rows if "latency_p50_ms" in row]
     if not told:
         raise SystemExit("the controller told no latency")
-    refused = {fault.name.lower(): told[-1].get(fault.name.lower(), "0") for fault in Fault}
+    refused = {fault.name.lower(): told[-1].get(fault.name.lower(), "0") for fault in Refusal}
     latency = {key: statistics.median(float(row[f"latency_{key}_ms"]) for row in told) for key in ("p50", "p99")}
     return latency, ", ".join(f"{name} {count}" for name, count in refused.items() if count != "0")
 
