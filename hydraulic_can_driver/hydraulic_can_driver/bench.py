@@ -100,7 +100,11 @@ class Bench:
         self.readings = {node.name: self.master.readings(node) for node in self.bus.nodes.values()}
 
     def inspect(self) -> None:
-        """Check who is there and read back what they are set to; nothing is written. Raises as `boot`."""
+        """Check who is there and read back what they are set to; nothing is written.
+
+        :raises DeviceError: as `boot`.
+        :raises BusDownError: nothing can be sent.
+        """
         for node in self.bus.nodes.values():
             self.master.identify(node)
         self.readings = {node.name: self.master.readings(node) for node in self.bus.nodes.values()}

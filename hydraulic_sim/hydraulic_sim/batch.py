@@ -28,7 +28,9 @@ class Job:
 def simulate_batch(jobs: Sequence[Job], workers: int | None = None) -> list[Trajectory]:
     """Simulate all jobs and return their trajectories in order: bit for bit what one by one gives.
 
-    The compiled plant holds no lock, so threads use every core. Raises the first `SimulationError`.
+    The compiled plant holds no lock, so threads use every core.
+
+    :raises SimulationError: a job fails; the first error is raised.
     """
     count = workers or os.cpu_count() or 1
     if count == 1 or len(jobs) < 2:
@@ -45,8 +47,9 @@ def scatter(model: Model, relative: Mapping[str, float], count: int, seed: int) 
     """``count`` copies of a model with scattered parameters, for Monte Carlo studies.
 
     ``relative``: key → standard deviation relative to the model's value; drawn normal, cut at three deviations and
-    at the library's bounds. The same seed gives the same models. Raises `ModelError` for an unknown key or a negative
-    deviation.
+    at the library's bounds. The same seed gives the same models.
+
+    :raises ModelError: an unknown key or a negative deviation.
     """
     for key, deviation in relative.items():
         model.parameter(key)

@@ -8,7 +8,10 @@ from .registry import Library
 
 
 def describe(library: Library, name: str) -> dict[str, object]:
-    """Everything that an effect's record says, JSON-ready. Raises `EffectError` for an unknown name."""
+    """Everything that an effect's record says, JSON-ready.
+
+    :raises EffectError: an unknown name.
+    """
     effect = library[name]
     slot = slots.SLOTS[effect.slot]
     return {

@@ -35,16 +35,19 @@ class Layout:
 
     @cached_property
     def effects(self) -> dict[str, int]:
+        """Effect → its switch."""
         return {name: i for i, name in enumerate(self.library)}
 
     @cached_property
     def parameters(self) -> dict[str, int]:
+        """Key of a parameter → its place in P."""
         keys = [p.name for p in base.PARAMETERS]
         keys += [f"{e.name}.{p.name}" for e in self.library.values() for p in e.parameters]
         return {key: i for i, key in enumerate(keys)}
 
     @cached_property
     def state_records(self) -> dict[str, State]:
+        """Key of a state → its record, rate states first."""
         every = {s.name: s for s in base.STATES}
         every |= {f"{e.name}.{s.name}": s for e in self.library.values() for s in e.states}
         by_kind = sorted(every.items(), key=lambda item: item[1].kind == "relaxation")
@@ -52,14 +55,17 @@ class Layout:
 
     @cached_property
     def states(self) -> dict[str, int]:
+        """Key of a state → its place in X."""
         return {key: i for i, key in enumerate(self.state_records)}
 
     @cached_property
     def n_rates(self) -> int:
+        """How many of the states are rate states."""
         return sum(s.kind == "rate" for s in self.state_records.values())
 
     @cached_property
     def memories(self) -> dict[str, slice]:
+        """Effect → its part of M."""
         found, start = {}, 0
         for effect in self.library.values():
             if effect.memory:
@@ -69,6 +75,7 @@ class Layout:
 
     @cached_property
     def n_memory(self) -> int:
+        """Length of M."""
         return max((s.stop for s in self.memories.values()), default=0)
 
 
@@ -79,12 +86,15 @@ class Writer:
         self.layout = layout
 
     def members(self, slot: str) -> list[Effect]:
+        """Effects that act in a slot."""
         return [e for e in self.layout.library.values() if e.slot == slot]
 
     def parameter(self, key: str) -> str:
+        """Text of a parameter's value."""
         return f"P[{self.layout.parameters[key]}]"
 
     def call(self, effect: Effect, which: str = "kernel") -> str:
+        """Text of the call of an effect's function."""
         return (
             f"{effect.name}__{which}({', '.join(self._value(effect, a) for a in arguments(effect.functions()[which]))})"
         )
@@ -163,6 +173,7 @@ class Writer:
         return " or ".join(f"{value} != {null!r}" for value, null in keyed if null is not None) or "True"
 
     def constants(self) -> str:
+        """Text of what does not change within a run."""
         p = self.parameter
         return "\n".join(
             [

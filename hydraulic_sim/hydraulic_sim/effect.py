@@ -127,6 +127,7 @@ class Effect:
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters, without the effect's."""
         return tuple(p.name for p in self.parameters)
 
     def functions(self) -> dict[str, Callable]:

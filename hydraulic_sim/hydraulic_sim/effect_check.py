@@ -20,7 +20,10 @@ EITHER_SIGN = {"position": 0.01, "velocity": 0.02, "pressure_difference": 1e6, "
 
 
 def check_effect(effect: Effect, path: Path) -> None:
-    """Raise `EffectError`, naming the file, for an unknown unit or a kernel that does not return what its slot asks."""
+    """Try an effect's units and kernels.
+
+    :raises EffectError: an unknown unit, or a kernel that does not return what its slot asks; the text names the file.
+    """
     units = {p.name: p.unit for p in effect.parameters} | {s.name: s.unit for s in effect.states}
     for name, unit in units.items():
         try:

@@ -17,9 +17,12 @@ POSITION, VELOCITY, PRESSURE_A, PRESSURE_B, TRUE_POSITION = (
 
 
 class Embedded(NamedTuple):
-    """``run(u, dt, start, longest_step, turn, on, parameters, hydraulic, x, memory, out, failure)`` integrates the
-    drive u (N,) [V] and fills out (N, outputs); it returns how many samples it could follow. Everything but u, dt [s],
-    start [s], the state (x, memory), out and failure (2,) is here."""
+    """A compiled plant as another compiled function calls it.
+
+    ``run(u, dt, start, longest_step, turn, on, parameters, hydraulic, x, memory, out, failure)`` integrates the drive
+    u (N,) [V] and fills out (N, outputs); it returns how many samples it could follow. Everything but u, dt [s],
+    start [s], the state (x, memory), out and failure (2,) is here.
+    """
 
     run: Callable
     longest_step: float

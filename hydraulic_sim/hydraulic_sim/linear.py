@@ -39,8 +39,11 @@ class OperatingPoint:
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """The third-order model's constants: flow gain [m³/(s·V)], flow-pressure coefficient [m³/(s·Pa)], velocity gain
-    [m/(s·V)], natural frequency [rad/s] and damping ratio."""
+    """The third-order model's constants.
+
+    Flow gain [m³/(s·V)], flow-pressure coefficient [m³/(s·Pa)], velocity gain [m/(s·V)], natural frequency [rad/s] and
+    damping ratio.
+    """
 
     flow_gain: float
     flow_pressure: float
@@ -59,7 +62,8 @@ def linearise(model: Model, position: float = 0.0, drive: float = 0.0) -> contro
 
     Dry friction is left out: it has no linear part (its describing function depends on the amplitude). Effects that
     act per sample (dead time, play, sensor lag) are not part of it either. States are named.
-    Raises `SimulationError` when no steady motion exists at that drive.
+
+    :raises SimulationError: no steady motion exists at that drive.
     """
     plant, active = _smooth_plant(model)
     point = operating_point(model, position, drive)
@@ -86,7 +90,10 @@ def linearise(model: Model, position: float = 0.0, drive: float = 0.0) -> contro
 
 
 def operating_point(model: Model, position: float = 0.0, drive: float = 0.0) -> OperatingPoint:
-    """The steady motion at a constant drive, dry friction left out. Raises `SimulationError` where there is none."""
+    """The steady motion at a constant drive, dry friction left out.
+
+    :raises SimulationError: there is none.
+    """
     plant, active = _smooth_plant(model)
     start = plant.initial_state(position=position, drive=drive).states
     moving = [i for name, i in active.items() if name != "position"]
@@ -114,7 +121,9 @@ def closed_form(model: Model) -> ClosedForm:
     """The third-order model of a symmetric actuator around rest in mid stroke.
 
     Flow gain of a critical-centre valve at no load, K_q = Q_r/√Δp_r·√((p_S − p_T)/2)/u_max; K_c from what the lands
-    leak when shut. Raises `SimulationError` for unequal piston areas.
+    leak when shut.
+
+    :raises SimulationError: unequal piston areas.
     """
     area = model.value("piston_area_a")
     if abs(area / model.value("piston_area_b") - 1.0) > 1e-3:

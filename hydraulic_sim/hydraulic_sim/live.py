@@ -15,7 +15,10 @@ class LivePlant:
     """One running plant; `step` costs a few microseconds. Not to be shared between threads."""
 
     def __init__(self, plant: Plant, initial: PlantState | None = None) -> None:
-        """From ``initial``, by default rest in mid stroke. Raises `SimulationError` for a state of another library."""
+        """From ``initial``, by default rest in mid stroke.
+
+        :raises SimulationError: a state of another library.
+        """
         initial = initial or plant.initial_state()
         plant.check_state(initial)
         self.plant = plant
@@ -30,7 +33,7 @@ class LivePlant:
     def step(self, drive: float, dt: float) -> PlantValues:
         """What the sensors say now, with ``drive`` [V] applied from now on; then advance by ``dt`` [s].
 
-        Raises `SimulationError` as `Plant.simulate` does.
+        :raises SimulationError: as `Plant.simulate` does.
         """
         applied = min(max(drive, -self._limit), self._limit)
         self._drive[0] = applied
@@ -40,14 +43,18 @@ class LivePlant:
         return PlantValues(x, v, p_a, p_b, p_s, spool, p_a * self._areas[0] - p_b * self._areas[1], applied)
 
     def set_value(self, key: str, value: float) -> None:
-        """Change a parameter while running (SI); raises `ModelError` for an unknown key or a value out of bounds."""
+        """Change a parameter while running (SI).
+
+        :raises ModelError: an unknown key or a value out of bounds.
+        """
         self.replace_model(self.plant.model.with_values({key: value}))
 
     def replace_model(self, model: Model) -> None:
         """Go on with another model of the same library (effects on or off, other values) from the present state.
 
-        Raises `ModelError` when the model's effect files are not those this plant was compiled from: others, or
-        edited since. States and memories would not fit.
+        States and memories would not fit.
+
+        :raises ModelError: its effect files are not those this plant was compiled from: others, or edited since.
         """
         if model.library.fingerprint != self.plant.model.library.fingerprint:
             raise ModelError(f"model {model.name!r} has other effect files than the plant that runs, or edited ones")

@@ -56,7 +56,10 @@ class Model:
         return library(self.user_effects)
 
     def parameter(self, key: str) -> Parameter:
-        """The library's record of a parameter. Raises `ModelError` for an unknown key."""
+        """The library's record of a parameter.
+
+        :raises ModelError: an unknown key.
+        """
         try:
             return self.library.parameter(key)
         except EffectError as error:
@@ -112,8 +115,9 @@ class Model:
     def with_values(self, values: Mapping[str, float], *, source: str | None = None) -> Model:
         """A copy with other values [SI]. A value that changes takes ``source``, and loses the standard error.
 
-        Raises `ModelError` for an unknown key or a value out of the library's bounds. Those of an entry bind fits and
-        files only.
+        Bounds of an entry bind fits and files only.
+
+        :raises ModelError: an unknown key or a value out of the library's bounds.
         """
         entries = dict(self.entries)
         for key, value in values.items():
@@ -156,7 +160,10 @@ class Model:
         return replace(self, history=(*self.history, record))
 
     def check_laws(self) -> None:
-        """Raise `ModelError` when two laws claim the same slot, or an effect is named twice."""
+        """Check that the effects go together.
+
+        :raises ModelError: two laws claim the same slot, or an effect is named twice.
+        """
         taken: dict[str, str] = {}
         for name in self.effects:
             if self.effects.count(name) > 1:
@@ -170,7 +177,10 @@ class Model:
                 taken[slot] = name
 
     def check_complete(self) -> None:
-        """Raise `ModelError` when the model does not compose: laws that exclude each other, values missing."""
+        """Check that the model composes.
+
+        :raises ModelError: laws exclude each other, or values are missing.
+        """
         if self.kind not in KINDS:
             raise ModelError(f"{self._label}: plant is {self.kind!r}; allowed: {', '.join(KINDS)}")
         self.check_laws()
@@ -197,7 +207,10 @@ class Model:
 
 
 def check_bounds(key: str, record: Parameter, bounds: Iterable[float]) -> tuple[float, float]:
-    """Bounds that a model file narrows: in order and within the library's. Raises `ModelError`."""
+    """Bounds that a model file narrows: in order and within the library's.
+
+    :raises ModelError: they are not.
+    """
     low, high = (float(b) for b in bounds)
     if not record.bounds[0] <= low < high <= record.bounds[1]:
         raise ModelError(
@@ -208,7 +221,10 @@ def check_bounds(key: str, record: Parameter, bounds: Iterable[float]) -> tuple[
 
 
 def check_within(key: str, record: Parameter, value: float, bounds: tuple[float, float] | None) -> None:
-    """Raise `ModelError` when a value lies outside the bounds that a model file gives for it."""
+    """Check a value against the bounds that a model file gives for it.
+
+    :raises ModelError: it lies outside.
+    """
     if bounds is not None and not bounds[0] <= value <= bounds[1]:
         raise ModelError(
             f"{key}: {value:g} {record.unit} is outside its bounds {bounds[0]:g} … {bounds[1]:g} {record.unit}"

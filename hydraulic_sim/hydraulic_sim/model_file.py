@@ -48,7 +48,7 @@ def presets() -> dict[str, Path]:
 def load_model(source: str | Path) -> Model:
     """Read a model file, or a preset by its name.
 
-    Raises `ModelError` naming file, line, key, value and what is allowed.
+    :raises ModelError: it is not acceptable; the text names file, line, key, value and what is allowed.
     """
     path = Path(source)
     if not path.is_file():
@@ -69,8 +69,10 @@ def load_model(source: str | Path) -> Model:
 def save_model(model: Model, path: str | Path, overwrite: bool = False) -> Path:
     """Write a model; comments of the file it was read from are kept.
 
-    The file appears whole or not at all. Raises `ModelError` if ``path`` exists, its folder does not, or the model
-    does not compose or holds something that has no place in a file.
+    The file appears whole or not at all.
+
+    :raises ModelError: ``path`` exists, its folder does not, or the model does not compose or holds something that has
+        no place in a file.
     """
     target = Path(path)
     if target.exists() and not overwrite:

@@ -30,7 +30,8 @@ class Plant:
     Building one costs about 0.1 ms once the library is compiled in this process. Simulation releases the GIL.
     ``longest_step`` [s] is shortened where the physics is faster; ``refinement`` shortens the steps that follow the
     oil through the lands as well (see `following`).
-    Raises `ModelError` for a model that does not compose (two laws in one slot, missing base parameters).
+
+    :raises ModelError: a model that does not compose (two laws in one slot, missing base parameters).
     """
 
     def __init__(self, model: Model, longest_step: float = LONGEST_STEP, refinement: float = 1.0) -> None:
@@ -59,7 +60,9 @@ class Plant:
     def at_rate(cls, model: Model, rate: float) -> Plant:
         """The plant of a model, its step fine enough for drives sampled at ``rate`` [Hz] (see `following`).
 
-        Tried on half a second of a sweep from 1 to 40 Hz at a third of the drive. Raises `SimulationError`.
+        Tried on half a second of a sweep from 1 to 40 Hz at a third of the drive.
+
+        :raises SimulationError: no step follows its physics.
         """
         t = np.arange(max(2, round(0.5 * rate))) / rate
         sweep = model.value("drive_limit") / 3.0 * np.sin(2.0 * np.pi * (1.0 + 39.0 * t) * t)
@@ -67,13 +70,16 @@ class Plant:
 
     @property
     def state_names(self) -> tuple[str, ...]:
+        """Keys of the states, in the order of their array."""
         return tuple(self.layout.states)
 
     def with_parameters(self, values: dict[str, float]) -> Plant:
         """This plant with other parameter values (SI); nothing is compiled. For fits: bounds are not checked.
 
         The integrator's step stays as it is, so that a small change of a value changes results smoothly, unless
-        the physics becomes more than twice too fast for it. Raises `ModelError` for an unknown key.
+        the physics becomes more than twice too fast for it.
+
+        :raises ModelError: an unknown key.
         """
         other = copy.copy(self)
         other._parameters = self._parameters.copy()
@@ -131,8 +137,8 @@ class Plant:
     def simulate(self, drive: ArrayLike, dt: float, initial: PlantState | None = None) -> Trajectory:
         """Run the plant over ``drive`` (N,) [V], held over each sample of ``dt`` [s].
 
-        Raises `SimulationError` when a state stops being finite or the step cannot follow (time, state and last
-        drive named).
+        :raises SimulationError: a state stops being finite or the step cannot follow (time, state and last drive
+            named).
         """
         u = np.require(drive, np.float64, ("C", "W"))  # records are read-only, which compiled code does not take
         if u.ndim != 1 or not np.all(np.isfinite(u)):
@@ -169,7 +175,9 @@ class Plant:
         ``starts`` (S,) sample indices into ``drive`` (N,); ``horizon`` samples ahead, ``starts + horizon`` < N;
         ``initial_states`` (S, n_states). Returns channel → (S, horizon + 1), column 0 being the start itself.
         Effects on the command remember the drive before each start, or begin with ``memories`` (S, n_memory) as
-        `track` gives them. Raises `SimulationError` as `simulate` does.
+        `track` gives them.
+
+        :raises SimulationError: as `simulate` does.
         """
         u = np.require(drive, np.float64, ("C", "W"))  # records are read-only, which compiled code does not take
         first = np.require(starts, np.int64, ("C", "W"))
@@ -208,7 +216,9 @@ class Plant:
 
         ``drive`` (N,) [V]; ``starts`` (S,) rising sample indices; ``seen`` (N, 4): position, velocity, pressures of
         A and B as measured, NaN where they were not. Returns the states (S, n_states) and memories (S, n_memory);
-        those of the position's sensor begin anew, as what was measured has passed it. Raises `SimulationError`.
+        those of the position's sensor begin anew, as what was measured has passed it.
+
+        :raises SimulationError: a state stops being finite.
         """
         u = np.require(drive, np.float64, ("C", "W"))
         first = np.require(starts, np.int64, ("C", "W"))
@@ -235,7 +245,10 @@ class Plant:
         return states, memories
 
     def check_state(self, state: PlantState) -> None:
-        """Raise `SimulationError` for a state of another library: compiled code trusts the lengths."""
+        """Refuse a state of another library: compiled code trusts the lengths.
+
+        :raises SimulationError: the state is one.
+        """
         found, expected = (
             (state.states.shape, state.memory.shape),
             ((len(self.layout.states),), (self.layout.n_memory,)),
@@ -261,7 +274,9 @@ class Plant:
     def advance(self, u: Array, dt: float, start: float, x: Array, memory: Array, out: Array) -> None:
         """Move the state ``x`` and ``memory`` on in place over ``u`` (N,) [V] from the time ``start`` [s].
 
-        ``out`` (N, n_outputs) takes the outputs. Raises `SimulationError` as `simulate` does.
+        ``out`` (N, n_outputs) takes the outputs.
+
+        :raises SimulationError: as `simulate` does.
         """
         self._check_dt(dt)
         failure = np.zeros(2)
@@ -329,8 +344,8 @@ class Plant:
     ) -> Plant:
         """This plant, its step halved until halving it once more changes no output by more than ``tolerance``.
 
-        Raises `SimulationError` when `MOST_HALVINGS` do not suffice: the physics is too stiff for it, or chaotic
-        (a piston bouncing on its stop).
+        :raises SimulationError: `MOST_HALVINGS` do not suffice: the physics is too stiff for it, or chaotic (a piston
+            bouncing on its stop).
         """
         plant = self
         for _ in range(MOST_HALVINGS):

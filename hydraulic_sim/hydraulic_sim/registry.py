@@ -71,11 +71,17 @@ class Library(Mapping[str, Effect]):
         return str(self.source_file(name).parent) in effects.__path__
 
     def file(self, name: str) -> EffectFile:
-        """The effect with its file and the hash of its text. Raises `EffectError` for an unknown name."""
+        """The effect with its file and the hash of its text.
+
+        :raises EffectError: an unknown name.
+        """
         return EffectFile(self[name], *self._files[name][1:])
 
     def parameter(self, key: str) -> Parameter:
-        """The parameter behind a key: ``moving_mass`` or ``coulomb_friction.force``. Raises `EffectError`."""
+        """The parameter behind a key: ``moving_mass`` or ``coulomb_friction.force``.
+
+        :raises EffectError: an unknown effect or parameter.
+        """
         owner, _, name = key.rpartition(".")
         group = self[owner].parameters if owner else base.PARAMETERS
         for parameter in group:
@@ -91,7 +97,10 @@ class Library(Mapping[str, Effect]):
         return _digest("".join(f"{name} {self._files[name].digest}\n" for name in self).encode())
 
     def with_files(self, files: Iterable[str | Path]) -> Library:
-        """This library and the effects of the given files. Raises `EffectError`."""
+        """This library and the effects of the given files.
+
+        :raises EffectError: a file is unusable, or its name is taken.
+        """
         added = tuple(load_effect(Path(f)) for f in files)
         if not added:
             return self
@@ -105,7 +114,10 @@ class Library(Mapping[str, Effect]):
 
 
 def load_effect(path: Path) -> EffectFile:
-    """Read one effect file; its name is the file's. Raises `EffectError`, naming the file."""
+    """Read one effect file; its name is the file's.
+
+    :raises EffectError: it is no effect file; the text names it.
+    """
     path = path.expanduser().resolve()
     if not path.is_file():
         raise EffectError(f"{path}: there is no such effect file")

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Slot:
-    """One stage. ``kind``: "law" (one effect at a time, with an ideal default), "chain" (each effect takes the
-    stage's signal and returns it changed) or "sum" (contributions add). ``returns`` names what a kernel returns;
-    ``signal`` is a chain's or a law's own signal. ``subsystem`` is the part of the bench it belongs to. ``hydraulic``
-    marks a stage that a mechanical plant does not have."""
+    """One stage.
+
+    ``kind``: "law" (one effect at a time, with an ideal default), "chain" (each effect takes the stage's signal and
+    returns it changed) or "sum" (contributions add). ``returns`` names what a kernel returns. ``subsystem`` is the part
+    of the bench it belongs to. ``hydraulic`` marks a stage that a mechanical plant does not have.
+    """
 
     name: str
     kind: str
@@ -27,6 +29,7 @@ class Slot:
 
     @property
     def signal(self) -> str:
+        """A chain's or a law's own signal."""
         return self.returns[0]
 
 

@@ -24,8 +24,8 @@ def _registry() -> pint.UnitRegistry:
 def to_si(value: float | int | str, unit: str, where: str = "value") -> float:
     """``value`` in SI unit ``unit``: a number is taken to be in it, a text may carry a unit of its own.
 
-    Raises `ModelError` (naming ``where``) for text that is no number with a unit, a unit of another dimension, an
-    angle where there must be none (2 rad/s is not 2 Hz), NaN or infinity.
+    :raises ModelError: a text that is no number with a unit, a unit of another dimension, an angle where there must be
+        none (2 rad/s is not 2 Hz), NaN or infinity; the text names ``where``.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ModelError(f"{where}: {value!r} is not a number or a quantity such as '12.5 {unit}'")
@@ -62,7 +62,10 @@ def _angle(quantity: pint.Quantity) -> float:
 
 
 def conversion(unit: str, si_unit: str, where: str = "unit") -> tuple[float, float]:
-    """(factor, offset) so that SI = factor·value + offset; raises `ModelError` for an unknown or other dimension."""
+    """(factor, offset) so that SI = factor·value + offset.
+
+    :raises ModelError: an unknown or other dimension.
+    """
     try:
         zero = float(_registry().Quantity(0.0, unit).to(si_unit).magnitude)
         one = float(_registry().Quantity(1.0, unit).to(si_unit).magnitude)

@@ -12,7 +12,8 @@ from hydraulic_sim.model import Model
 def switched(model: Model, extra: tuple[str, ...], text: str) -> tuple[Model, tuple[str, ...]]:
     """The model with exactly the effects of ``text`` beside its own, instead of ``extra``; and their names.
 
-    Raises `BackendError` for a bad text or one of the model's own effects, `ModelError` for what does not compose.
+    :raises BackendError: a bad text, or one of the model's own effects.
+    :raises ModelError: what does not compose.
     """
     wanted = extra_effects(text)
     for name in extra:
@@ -27,7 +28,9 @@ def switched(model: Model, extra: tuple[str, ...], text: str) -> tuple[Model, tu
 def extra_effects(text: str) -> dict[str, dict[str, float]]:
     """Effect → its parameters [SI] in a YAML mapping; an effect without parameters (null) has the library's defaults.
 
-    Raises `BackendError` for what is no such mapping. Whether effects and parameters exist is the model's business.
+    Whether effects and parameters exist is the model's business.
+
+    :raises BackendError: what is no such mapping.
     """
     try:
         document = YAML(typ="safe").load(text) if text.strip() else {}

@@ -35,9 +35,11 @@ class Limits:
 
     @classmethod
     def of(cls, model: Model, centre: float = 0.0) -> Limits:
-        """Those of a model: 95 % of the drive, 80 % of the way from the centre to the nearer stop, 90 % of the speed
-        at full drive, at least 0.2 MPa above absolute vacuum in both chambers (below, air comes out of the oil), at
-        most the supply pressure and a quarter.
+        """Those of a model.
+
+        95 % of the drive, 80 % of the way from the centre to the nearer stop, 90 % of the speed at full drive, at least
+        0.2 MPa above absolute vacuum in both chambers (below, air comes out of the oil), at most the supply pressure
+        and a quarter.
         """
         drive = model.value("drive_limit")
         hydraulic = model.kind == "hydraulic"
@@ -82,8 +84,7 @@ def largest(plan: Plan, model: Model, limits: Limits | None = None, share: float
     Found by bisection to 1 %; at most `cap` times what the plan has. The plan's travel and amplitude limits become
     those of `limits`, so that the run on the bench aborts where the prediction promised that it would not go.
 
-    Raises:
-        ExcitationError: no amplitude down to a thousandth of the drive keeps the limits; says which one breaks.
+    :raises ExcitationError: no amplitude down to a thousandth of the drive keeps the limits; says which one breaks.
     """
     limits = limits or Limits.of(model, plan.centre)
     plant = Plant(model)

@@ -30,8 +30,7 @@ class _Block:
 
 
 class AppliedDriveCheck:
-    """Compares the drive that the plant reports as applied with what was commanded, block by block of
-    `window` [s].
+    """Compares the drive that the plant reports as applied with what was commanded, in blocks of `window` [s].
 
     A plant follows late, and an amplifier may follow coarsely, so single samples are not compared. At the end
     of each block the applied drives must lie within the range of this and the last block's commands, and must

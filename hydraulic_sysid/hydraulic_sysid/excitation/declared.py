@@ -32,7 +32,7 @@ class Declaration:
 def in_unit(value: Any, unit: str) -> float:
     """`value` as a float in `unit`: a number, its text, or text with a unit of its own ("500 mV").
 
-    Raises ValueError for anything else, also for a unit of another dimension.
+    :raises ValueError: anything else, also a unit of another dimension.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{value!r} is not a number")
@@ -157,8 +157,7 @@ class Declared:
     def from_mapping(cls: type[D], mapping: Mapping[str, Any], folder: Path | None = None) -> D:
         """Build from `mapping`; relative paths count from `folder`.
 
-        Raises:
-            PlanError: a key is unknown or missing, or a value is not allowed.
+        :raises PlanError: a key is unknown or missing, or a value is not allowed.
         """
         declared = {item.name: item for item in declared_fields(cls)}
         for key, value in mapping.items():

@@ -36,8 +36,11 @@ _HARMONICS = 5.0  # a wave with corners reaches to the end of the band with its 
 
 @dataclass(frozen=True)
 class Wish:
-    """What is wished for: the band [Hz], the bandwidth it came from [Hz], the length of the signal [s], the rate
-    [Hz], the seed, and how many periods of a periodic signal fit in the length."""
+    """What is wished for.
+
+    The band [Hz], the bandwidth it came from [Hz], the length of the signal [s], the rate [Hz], the seed, and how many
+    periods of a periodic signal fit in the length.
+    """
 
     low: float
     high: float
@@ -88,8 +91,7 @@ SIGNALS: dict[str, Callable[[Wish], Signal]] = {
 def propose(name: str, wish: Wish) -> Plan:
     """The plan of a design at about 1 V; its amplitude is found with `amplitude.largest`.
 
-    Raises:
-        ExcitationError: no such design, or a band that does not fit the duration or the rate.
+    :raises ExcitationError: no such design, or a band that does not fit the duration or the rate.
     """
     if name not in SIGNALS:
         raise ExcitationError(f"signal {name!r} is none of {', '.join(SIGNALS)}")

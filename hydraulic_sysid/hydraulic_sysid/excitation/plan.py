@@ -67,6 +67,7 @@ class Plan(Declared):
     prediction: Prediction | None = section("what a model does under this plan", Prediction, None)
 
     def check(self) -> None:
+        """Check what no single key can: duration, drive and travel against the signal."""
         if self.duration is None:
             if self.signal.length is None:
                 raise self.error(
@@ -185,9 +186,8 @@ def shipped_plans() -> dict[str, Path]:
 def load_plan(source: str | Path) -> Plan:
     """The plan of a file, or a shipped one by its name ("chirp").
 
-    Raises:
-        PlanError: not allowed; names file, key, value and what is allowed.
-        PlaybackError: the file that a playback names is not readable.
+    :raises PlanError: not allowed; names file, key, value and what is allowed.
+    :raises PlaybackError: the file that a playback names is not readable.
     """
     file = Path(source)
     if not file.is_file():
@@ -208,8 +208,7 @@ def load_plan(source: str | Path) -> Plan:
 def save_plan(plan: Plan, file: str | Path, overwrite: bool = False) -> None:
     """Write `plan` to a YAML file; an existing file is only replaced with `overwrite`.
 
-    Raises:
-        ExcitationError: the file exists, or cannot be written.
+    :raises ExcitationError: the file exists, or cannot be written.
     """
     if Path(file).exists() and not overwrite:
         raise ExcitationError(f"{file}: plan not written: it exists")

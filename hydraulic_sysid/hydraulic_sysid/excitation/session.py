@@ -1,5 +1,4 @@
-"""From states, diagnostics and requests to commands and events: what the excitation node does, without
-ROS."""
+"""From states, diagnostics and requests to commands and events: what the excitation node does, without ROS."""
 
 from __future__ import annotations
 
@@ -76,8 +75,7 @@ class Session:
         return drive
 
     def silence(self, now: float) -> tuple[int, float] | None:
-        """To be called while no state comes: a last command (stamp in ns, 0 V) when that has lasted too
-        long."""
+        """To be called while no state comes: a last command (stamp in ns, 0 V) once that has lasted too long."""
         age = now - self._heard
         run = self.run
         if run is None or not run.check_age(age):

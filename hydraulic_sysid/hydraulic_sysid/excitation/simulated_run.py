@@ -19,8 +19,10 @@ _CHANNELS = ("position", "velocity", "pressure_a", "pressure_b", "pressure_suppl
 
 @dataclass(frozen=True)
 class Sensors:
-    """What stands between the plant and its record: white noise and resolution of the position, noise of each
-    pressure [m, m, Pa]."""
+    """What stands between the plant and its record.
+
+    White noise and resolution of the position, noise of each pressure [m, m, Pa].
+    """
 
     position_noise: float = 0.0
     position_resolution: float = 0.0
@@ -47,8 +49,7 @@ def simulate_plan(
 
     As on the bench, a drive answers a state and acts from the next one on.
 
-    Raises:
-        SimulationError: the model cannot follow.
+    :raises SimulationError: the model cannot follow.
     """
     sensors = sensors or Sensors()
     run = ExcitationRun(plan)

@@ -53,9 +53,9 @@ _LOWEST_HZ, _HIGHEST_HZ, _POINTS = 1e-3, 1e3, 12001
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """Both bandwidths [Hz], the gains behind them, and the response they were taken from; the velocity's is NaN where
-    the response ends before it.
+    """Both bandwidths [Hz], the gains behind them, and the response they were taken from.
 
+    The velocity's bandwidth is NaN where the response ends before it.
     ``velocity_gain`` [m/(s·V)] at low frequencies, ``critical_gain`` [V/m] at ``phase_crossover`` [Hz], ``frequency``
     (K,) [Hz], ``response`` (K,) drive to position [m/V], ``closed_loop`` (K,).
     """

@@ -53,7 +53,7 @@ class Panels:
 
     (Plotly's own figure methods check every call against its whole schema, which takes longer than comparing
     the records.) With ``one_time`` all panels are stacked on one time axis, so that zooming and hovering act on
-    all. Every text is plain: Plotly reads tags in it, which are escaped, and a line break is ``\\n``.
+    all. Every text is plain: Plotly reads tags in it, which are escaped, and breaks lines at newlines.
     """
 
     rows: int

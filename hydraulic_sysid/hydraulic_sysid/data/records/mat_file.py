@@ -31,7 +31,7 @@ def read_mat(path: Path, columns: ColumnMap | None, name: str) -> list[Record]:
 
 
 class MatTable:
-    """The variables of a MATLAB file; a matrix gives its columns as ``name.1``, ``name.2``, …"""
+    """The variables of a MATLAB file; a matrix gives its columns as ``name.1``, ``name.2`` and so on."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

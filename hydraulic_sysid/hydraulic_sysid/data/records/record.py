@@ -88,7 +88,10 @@ class Record:
             raise ChannelError(f"{self.name} has no channel {channel!r}; it has {there}") from None
 
     def require(self, *channels: str, error: type[Exception] = ChannelError) -> None:
-        """Raise ``error`` where one of these channels is missing, naming those there are."""
+        """Check that these channels are there.
+
+        :raises error: one is missing; the text names those there are.
+        """
         for channel in channels:
             if channel not in self:
                 raise error(f"{self.name}: no channel {channel!r}; the record has {', '.join(sorted(self.channels))}")

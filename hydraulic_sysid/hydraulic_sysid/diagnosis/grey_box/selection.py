@@ -24,8 +24,10 @@ _DEPENDENT = 1e-8
 
 @dataclass(frozen=True)
 class Selected:
-    """Indices of the terms in the order in which they joined, their coefficients, and the mean squared error that
-    as many terms leave on blocks left out."""
+    """Terms in the order in which they joined.
+
+    Their indices, their coefficients, and the mean squared error that as many terms leave on blocks left out.
+    """
 
     order: list[int]
     coefficients: Array

@@ -38,8 +38,7 @@ class Signal(Declared):
     def scaled(self: S, factor: float) -> S:
         """The same signal, `factor` times as large: every setting in volts is multiplied.
 
-        Raises:
-            PlanError: a setting leaves its range.
+        :raises PlanError: a setting leaves its range.
         """
         return replace(self, **{name: _times(getattr(self, name), factor) for name in self._volts()})
 

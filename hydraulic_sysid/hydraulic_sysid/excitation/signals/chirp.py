@@ -14,8 +14,7 @@ from hydraulic_sysid.excitation.signals._base import Signal, amplitude
 
 @dataclass(frozen=True)
 class Chirp(Signal):
-    """u(t) = A·sin(φ0 + 2π∫f dt), f from `frequency_start` to `frequency_end` within `sweep_time`, then over
-    again.
+    """u(t) = A·sin(φ0 + 2π∫f dt), f from `frequency_start` to `frequency_end` within `sweep_time`, then again.
 
     Linear: f = f0 + (f1 − f0)·t/T; exponential: f = f0·(f1/f0)^(t/T), the same time in every octave. A phase
     of 90° makes it the cosine form of Nisar & Munawar (their linear sweep, 0.1 … 2 times the bandwidth); on

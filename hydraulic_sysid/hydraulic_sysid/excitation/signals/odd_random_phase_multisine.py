@@ -13,12 +13,12 @@ from hydraulic_sysid.excitation.signals._lines import BandOfLines, random_phases
 
 @dataclass(frozen=True)
 class OddRandomPhaseMultisine(BandOfLines):
-    """Odd multiples of 1/`period` within a band, one amplitude, random phases; of every `group` neighbours one is
-    left out at random.
+    """Odd multiples of 1/`period` within a band, one amplitude, random phases.
 
-    A linear plant answers on the lines that are played. An even nonlinearity (gain that depends on the direction)
-    answers on even lines, an odd one (friction, dead band, saturation) on odd ones: the *detection lines*, even lines
-    and the odd ones left out, show both apart from each other, and from the noise, which differs between periods.
+    Of every `group` neighbours one is left out at random. A linear plant answers on the lines that are played. An even
+    nonlinearity (gain that depends on the direction) answers on even lines, an odd one (friction, dead band,
+    saturation) on odd ones: the *detection lines*, even lines and the odd ones left out, show both apart from each
+    other, and from the noise, which differs between periods.
 
     Realisations that shall be averaged differ in `seed` and share `lines_seed`.
 

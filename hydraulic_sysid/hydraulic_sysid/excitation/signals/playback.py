@@ -23,8 +23,7 @@ DRIVE_COLUMNS = ("drive_V", "command_V")
 
 @dataclass(frozen=True)
 class Playback(Signal):
-    """The drive of a CSV file (.csv or .csv.gz), each value held until the next one's time; 0 V after the
-    last.
+    """The drive of a CSV file (.csv or .csv.gz), each value held until the next one's time; 0 V after the last.
 
     Columns by header: `time_s` and `drive_V` (or `command_V`), others are passed over; without a header,
     exactly two columns: time [s], drive [V]. Times start anywhere and rise; they need not be regular.
@@ -75,9 +74,8 @@ class Playback(Signal):
 def read_drive(file: Path) -> tuple[Array, Array]:
     """Times [s] and drive [V], (N,) each, N ≥ 2, of a CSV file.
 
-    Raises:
-        PlaybackError: no such columns, a value that is no finite number, or times that do not rise;
-            names row and column.
+    :raises PlaybackError: no such columns, a value that is no finite number, or times that do not rise; names row and
+        column.
     """
     from hydraulic_sysid.data.records.csv_file import CsvTable  # only here: few plans play a file back
 

@@ -14,8 +14,7 @@ from hydraulic_sysid.excitation.signals._base import Signal
 
 @dataclass(frozen=True)
 class Steps(Signal):
-    """The levels one after the other, each held for `hold`, then over again; rising levels make a
-    staircase."""
+    """The levels one after the other, each held for `hold`, then over again; rising levels make a staircase."""
 
     levels: tuple[float, ...] = numbers("V", "the levels in their order", minimum=-DRIVE_LIMIT_V, maximum=DRIVE_LIMIT_V)
     hold: float = number("s", "how long each level stands", above=0.0, maximum=3600.0)

@@ -27,8 +27,10 @@ from .periodic import Periods
 
 @dataclass(frozen=True)
 class Lines:
-    """Output at lines that were not played: frequency (D,) [Hz], amplitude (D,) (RMS over realisations), the standard
-    deviation (D,) of the noise in it."""
+    """Output at lines that were not played.
+
+    Frequency (D,) [Hz], amplitude (D,) (RMS over realisations), the standard deviation (D,) of the noise in it.
+    """
 
     frequency: Array
     amplitude: Array
@@ -40,8 +42,7 @@ class BestLinearApproximation:
     """The best linear approximation at the K lines that were played.
 
     ``noise`` and ``total`` (K,) are standard deviations of the response: from the periods, and from the realisations
-    (None for a single one). ``distortion`` (K,) is that of the nonlinear part in one realisation, √M·√(total² −
-    noise²), 0 where the noise hides it. ``output`` (K,) is the output's amplitude at the lines, ``output_noise`` (K,)
+    (None for a single one). ``output`` (K,) is the output's amplitude at the lines, ``output_noise`` (K,)
     the standard deviation of the part that the drive does not explain. ``odd`` and ``even`` are the detection lines,
     None where the excitation has none.
     """
@@ -59,6 +60,10 @@ class BestLinearApproximation:
 
     @property
     def distortion(self) -> Array | None:
+        """Standard deviation (K,) of the nonlinear part in one realisation, √M·√(total² − noise²).
+
+        It is 0 where the noise hides it, and None for a single realisation.
+        """
         if self.total is None:
             return None
         return np.sqrt(self.realisations * np.maximum(self.total**2 - self.noise**2, 0.0))

@@ -117,8 +117,10 @@ def _curve(response: Complex) -> dict[str, Any]:
 
 
 def _level(lines: Lines | None, found: BestLinearApproximation, weigh: Callable[[Array], Array]) -> float | None:
-    """Power at the detection lines over that of the linear output beside them, noise taken off [dB]; None where there
-    are no such lines, or no more than noise on them."""
+    """Power at the detection lines over that of the linear output beside them, noise taken off [dB].
+
+    None where there are no such lines, or no more than noise on them.
+    """
     if lines is None:
         return None
     beside = np.interp(lines.frequency, found.frequency, found.output**2)
@@ -138,8 +140,10 @@ def _ratio(power: Array, reference: Array, weight: Array) -> float | None:
 
 
 def _linear_fit_limit(found: BestLinearApproximation, levels: dict[str, float | None]) -> float | None:
-    """Best fit [%] that a linear model can reach on the played lines and those beside them: what of the output's
-    amplitude is neither distortion nor noise. None where distortion was not measured."""
+    """Best fit [%] that a linear model can reach on the played lines and those beside them.
+
+    It is what of the output's amplitude is neither distortion nor noise; None where distortion was not measured.
+    """
     played = float(np.sum(found.output**2))
     if found.odd is not None and found.even is not None:
         # On the lines that are played lies as much odd distortion as on the odd lines beside them.
@@ -153,8 +157,7 @@ def _linear_fit_limit(found: BestLinearApproximation, levels: dict[str, float | 
 
 
 def _spectral(record: Record, input: str, output: str, segment: float | None, width: float | None) -> dict[str, Any]:
-    """Welch's and the empirical estimate of a record; the output is taken to be that of an integrating plant where it
-    is a position."""
+    """Welch's and the empirical estimate of a record; a position is taken to be that of an integrating plant."""
     u, y, dt = record[input], record[output], record.dt
     integrating = output == "position"
     segment = segment or max(round(record.duration / _SEGMENTS / dt), 16) * dt

@@ -19,8 +19,7 @@ _PLAYED = 0.05  # of the strongest line: what is stronger was played, where no p
 
 @dataclass(frozen=True)
 class Periods:
-    """Drive and output of P whole periods, (P, N) each; the harmonics (K,) that were played, and the highest line of
-    interest."""
+    """Drive and output of P whole periods, (P, N) each, and the harmonics (K,) that were played."""
 
     name: str
     drive: Array

@@ -22,9 +22,11 @@ from hydraulic_sysid.linear.errors import FrequencyResponseError
 
 @dataclass(frozen=True)
 class Spectral:
-    """A frequency response over lines: frequency (K,) [Hz], response (K,) [output per input], coherence γ² (K,)
-    between 0 and 1, power of the drive (K,) relative to its strongest line, and the number of independent averages
-    behind each line."""
+    """A frequency response over lines.
+
+    Frequency (K,) [Hz], response (K,) [output per input], coherence γ² (K,) between 0 and 1, power of the drive (K,)
+    relative to its strongest line, and the number of independent averages behind each line.
+    """
 
     frequency: Array
     response: Complex
@@ -43,8 +45,10 @@ class Spectral:
 
     @property
     def played(self) -> Mask:
-        """Which lines (K,) the drive reaches with at least 10⁻⁵ of the power of the strongest; of others the coherence
-        is that of leakage."""
+        """Which lines (K,) the drive reaches with at least 10⁻⁵ of the power of the strongest.
+
+        Of others the coherence is that of leakage.
+        """
         return self.drive >= 1e-5
 
 

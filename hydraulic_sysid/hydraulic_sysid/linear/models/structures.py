@@ -38,7 +38,10 @@ class Structure(ABC):
 
     @abstractmethod
     def fit(self, drives: Arrays, outputs: Arrays, dt: float, offsets: str) -> LinearModel:
-        """The model of these experiments; raises `IdentificationError`."""
+        """The model of these experiments.
+
+        :raises IdentificationError: they do not give one.
+        """
 
     @abstractmethod
     def document(self) -> dict[str, Any]:

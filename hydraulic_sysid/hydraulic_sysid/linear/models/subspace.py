@@ -37,8 +37,10 @@ _MOST_WORK = 3e9  # samples times columns squared: about a second
 
 @dataclass(frozen=True)
 class Subspace:
-    """Observability matrix ``(i, i)`` with its ``singular_values``, and the weights ``(i, 2i)`` on the past that give
-    its coordinates: one is computed for all orders."""
+    """Observability matrix ``(i, i)`` with its ``singular_values``; one is computed for all orders.
+
+    The weights ``(i, 2i)`` on the past give its coordinates.
+    """
 
     vectors: Array
     singular_values: Array

@@ -53,7 +53,10 @@ class RunningArx:
                 yield slow.stamp_ns, step
 
     def set_forgetting(self, value: float) -> None:
-        """From now on; raises `IdentificationError` outside 0.5 … 1."""
+        """Forget by this factor from now on.
+
+        :raises IdentificationError: it lies outside 0.5 … 1.
+        """
         self.estimate.forgetting = self.fit.forgetting = value
 
     def save(self, path: str) -> Path:

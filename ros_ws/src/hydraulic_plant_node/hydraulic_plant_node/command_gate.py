@@ -1,5 +1,4 @@
-"""The gate every command passes on its way to an actuator: limits, watchdog, one source at a time, emergency
-stop.
+"""The gate of every command to an actuator: limits, watchdog, one source at a time, emergency stop.
 
 Rules, the same for a simulated and a real actuator:
 

@@ -50,8 +50,8 @@ class PlantBackend(ABC):
     def set_parameter(self, name: str, value: Any) -> None:  # noqa: B027 - nothing to set is a valid plant
         """Take the new value of a live parameter, from the next step on.
 
-        Raises, with a text for the user and nothing changed, where the plant cannot take it: the parameter of the node
-        then keeps its value too.
+        :raises HydraulicError: the plant cannot take it, and nothing is changed: the parameter of the node then keeps
+            its value too.
         """
 
     def sampling_rate(self, values: Mapping[str, Any]) -> float:

@@ -69,7 +69,9 @@ def read_bag(bag: Path, steps: Steps, most: float) -> list[Record]:
 def analyse(records: list[Record], held_out: list[Record], model: Model, out: Path, steps: Steps) -> Analysis:
     """Identify on ``records`` (validated on ``held_out``, or on the last fifth); compare the model with all of them.
 
-    Then say what the model lacks, and write the model that has it. Raises `DemoError`.
+    Then say what the model lacks, and write the model that has it.
+
+    :raises DemoError: a step failed.
     """
     steps.begin("identify", 2.0)
     identified, left_out = None, ""

@@ -47,15 +47,19 @@ _LAST_WORDS_S = 3.0
 
 
 class Steps(Protocol):
-    """What shows the progress: `begin` a step of so many seconds, `tick` now and then, `done`; `say` something."""
+    """What shows the progress."""
 
-    def begin(self, text: str, seconds: float) -> None: ...
+    def begin(self, text: str, seconds: float) -> None:
+        """A step begins that will take about so long [s]."""
 
-    def tick(self) -> None: ...
+    def tick(self) -> None:
+        """Time goes by within the step."""
 
-    def done(self) -> None: ...
+    def done(self) -> None:
+        """The step is finished."""
 
-    def say(self, text: str) -> None: ...
+    def say(self, text: str) -> None:
+        """Something that the user should know."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,10 @@ class Experiment:
 def run(
     plant: str, model: Path, experiments: Sequence[Experiment], out: Path, steps: Steps, lockstep: bool = True
 ) -> list[Path]:
-    """Run the experiments on a plant and return their bags. Raises `DemoError`; ends every process it started."""
+    """Run the experiments on a plant and return their bags.
+
+    :raises DemoError: a step failed; every process that was started has been ended.
+    """
     module = PLANTS[plant]
     package = module.partition(".")[0]
     if find_spec(package) is None or find_spec(f"{package}.nodes") is None or find_spec(module) is None:
@@ -170,7 +177,10 @@ def _experiment(crew: Crew, client, experiment: Experiment, out: Path, steps: St
 
 
 def _release(client, experiment: Experiment, steps: Steps) -> None:
-    """The plant enabled again, if a fault or a stop has latched it at 0 V. Raises `DemoError`."""
+    """The plant enabled again, if a fault or a stop has latched it at 0 V.
+
+    :raises DemoError: it cannot be enabled.
+    """
     problem = client.reset(_STEP_S)
     if problem:  # not all that a device reports is gone with a reset
         for transition in ("deactivate", "cleanup", "configure", "activate"):
@@ -182,7 +192,10 @@ def _release(client, experiment: Experiment, steps: Steps) -> None:
 
 
 def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, steps: Steps, attempt: int) -> str:
-    """Record one run into ``bag``; empty, or why the excitation aborted or did not start it. Raises `DemoError`."""
+    """Record one run into ``bag``; empty, or why the excitation aborted or did not start it.
+
+    :raises DemoError: a process failed, or none answered.
+    """
     seconds = load_plan(str(experiment.plan)).total_time
     suffix = f"{experiment.name}_{attempt}" if attempt > 1 else experiment.name
     step = f"{experiment.name}: start the recorder"

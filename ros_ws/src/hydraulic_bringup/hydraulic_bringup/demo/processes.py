@@ -131,7 +131,10 @@ class Crew:
         return child
 
     def check(self, step: str) -> None:
-        """Raise `DemoError` when a child has ended that should run, or has ended badly."""
+        """See whether all is well with the children.
+
+        :raises DemoError: one has ended that should run, or has ended badly.
+        """
         for child in self._children:
             code = child.exit_code
             if code is not None and code not in child.may_end:
@@ -145,7 +148,10 @@ class Crew:
         patience: float,
         tick: Callable[[], None] = lambda: None,
     ) -> None:
-        """Until ``condition`` is true. Raises `DemoError` when a child fails meanwhile, or it takes too long."""
+        """Until ``condition`` is true.
+
+        :raises DemoError: a child fails meanwhile, or it takes too long.
+        """
         deadline = time.monotonic() + patience
         while not condition():
             self.check(step)

@@ -116,8 +116,12 @@ def document(
     recorded: Sequence[Record],
     not_fitted: Mapping[str, str],
 ) -> dict[str, Any]:
-    """All of it. ``origins``: record → where it is from; ``recorded`` are those of the validation signals;
-    ``not_fitted``: excitation → why it gave no model."""
+    """All of it.
+
+    :param origins: record → where it is from
+    :param recorded: records of the validation signals
+    :param not_fitted: excitation → why it gave no model
+    """
     models = {one.excitation.name: one.model for one in found}
     cells = rmse_grid(models, plant, study.grid(bandwidth.position))
     table, thesis = models_table(found), thesis_table(found, cells)
