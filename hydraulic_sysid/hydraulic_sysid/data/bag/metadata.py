@@ -15,6 +15,7 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from hydraulic_sysid.data.bag.types import MessageType
+from hydraulic_sysid.data.results import write_text
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
@@ -104,13 +105,7 @@ def from_yaml(text: str) -> Any:
 
 def write(folder: Path, content: Mapping[str, Any]) -> None:
     """Write metadata.yaml into `folder`: it is there whole or not at all."""
-    target = folder / FILE_NAME
-    draft = target.with_suffix(".yaml.tmp")
-    with draft.open("w", encoding="utf-8") as file:
-        file.write(to_yaml({"rosbag2_bagfile_information": dict(content)}))
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(draft, target)
+    write_text(folder / FILE_NAME, to_yaml({"rosbag2_bagfile_information": dict(content)}))
     sync_folder(folder)
 
 

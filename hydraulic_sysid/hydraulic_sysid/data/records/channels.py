@@ -33,6 +33,11 @@ HELD = frozenset({"command", "drive", "reference"})
 """Channels that keep their value until the next one, and are not interpolated between samples."""
 
 
+def si_unit(quantity: str) -> str:
+    """SI unit of a channel or of "time"."""
+    return TIME_UNIT if quantity == TIME else CHANNELS[quantity].unit
+
+
 def allowed() -> str:
     """All channel names, for error texts."""
     return ", ".join(CHANNELS)

@@ -20,14 +20,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from hydraulic_sysid.data.errors import ColumnMapError
-from hydraulic_sysid.data.records.channels import CHANNELS, TIME, allowed
-from hydraulic_sysid.data.records.units import si_unit, to_si
+from hydraulic_sysid.data.records.channels import CHANNELS, TIME, allowed, si_unit
 
 IRREGULAR = ("error", "resample", "split")
 
@@ -158,6 +157,14 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
     )
 
 
+def named_columns(found: Mapping[str, Column], base: ColumnMap | None) -> ColumnMap:
+    """The map of columns that are called after their quantity; ``base`` says the rest, and perhaps the time."""
+    base = base or ColumnMap({})
+    channels = {name: column for name, column in found.items() if name != TIME}
+    own_time = base.time is not None or base.dt is not None
+    return replace(base, parts={"": channels}, time=base.time if own_time else found.get(TIME))
+
+
 def column_of_header(header: str) -> tuple[str, Column]:
     """Quantity ("time" or a channel) and column of a header such as "position_mm" or "pressure_a_bar".
 
@@ -171,7 +178,7 @@ def column_of_header(header: str) -> tuple[str, Column]:
             unit = text[len(quantity) + 1 :]
             if not unit:
                 raise ColumnMapError(f"{where}: no unit; write {quantity}_{si_unit(quantity)}, for example")
-            return quantity, Column(text, unit, *to_si(unit, quantity, where))
+            return quantity, Column(text, unit, *_si_factors(unit, quantity, where))
     raise ColumnMapError(
         f"{where} is no channel; expected <channel>_<unit> with time, {allowed()}; "
         "a column map can name or leave out any column"
@@ -213,8 +220,25 @@ def _column(document: Any, quantity: str | None, where: str) -> Column:
         raise ColumnMapError(f"{where}: 'unit' is {entry.get('unit')!r}, a text is needed; {wanted}")
     unit = entry["unit"]
     offset = _number(entry.get("offset", 0.0), f"{where}.offset")
-    factors = (1.0, 0.0) if quantity is None else to_si(unit, quantity, where)
+    factors = (1.0, 0.0) if quantity is None else _si_factors(unit, quantity, where)
     return Column(column, unit, *factors, sign, scale, offset)
+
+
+def _si_factors(unit: str, quantity: str, where: str) -> tuple[float, float]:
+    """``(factor, offset)`` with SI = factor·value + offset; raises `ColumnMapError` for another dimension."""
+    wanted = si_unit(quantity)
+    if unit == wanted:
+        return 1.0, 0.0
+    # Loaded only where a unit is to be converted: pint takes a good part of a second.
+    from hydraulic_sim.errors import ModelError
+    from hydraulic_sim.units import conversion
+
+    if not unit.strip():
+        raise ColumnMapError(f"{where}: no unit; expected one that converts to {wanted}")
+    try:
+        return conversion(unit.replace("_per_", "/").replace("_", " "), wanted)
+    except ModelError:
+        raise ColumnMapError(f"{where}: unit {unit!r} does not convert to {wanted}") from None
 
 
 def _mapping(document: Any, where: str, keys: Sequence[str] | None = None) -> Mapping[str, Any]:

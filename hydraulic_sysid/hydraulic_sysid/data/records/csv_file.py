@@ -6,14 +6,13 @@ import csv
 import gzip
 import zlib
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import ColumnMapError, FileError
-from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header
+from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header, named_columns
 from hydraulic_sysid.data.records.record import Record
 from hydraulic_sysid.data.records.table import records_of_table
 
@@ -92,15 +91,12 @@ class CsvTable:
             raise ColumnMapError(f"{self.path}, row {self._header_row}: {error}") from None
         if len(found) != len(self.names):
             raise ColumnMapError(f"{self.path}, row {self._header_row}: two columns are the same channel: {self.names}")
-        time = found.pop("time", None)
-        base = base or ColumnMap({})
-        if base.time is not None or base.dt is not None:
-            time = base.time
-        elif time is None:
+        columns = named_columns(found, base)
+        if columns.time is None and columns.dt is None:
             raise ColumnMapError(f"{self.path}, row {self._header_row}: no time column; expected one such as time_s")
-        if not found:
+        if not columns.parts[""]:
             raise ColumnMapError(f"{self.path}, row {self._header_row}: only a time; expected channels beside it")
-        return replace(base, parts={"": found}, time=time)
+        return columns
 
     def numbers(self, column: str | int) -> Array:
         """``(N,)`` numbers of a column."""

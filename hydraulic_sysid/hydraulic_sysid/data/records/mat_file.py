@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import ColumnMapError, FileError
-from hydraulic_sysid.data.records.channels import TIME
-from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header
+from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header, named_columns
 from hydraulic_sysid.data.records.record import Record
 from hydraulic_sysid.data.records.table import records_of_table
 
@@ -62,17 +60,14 @@ class MatTable:
             except ColumnMapError:
                 continue  # a MATLAB file is a whole workspace: what is not named as a channel is not meant
             found[quantity] = column
-        time = found.pop(TIME, None)
-        base = base or ColumnMap({})
-        if base.time is not None or base.dt is not None:
-            time = base.time
-        if (time is None and base.dt is None) or not found:
+        columns = named_columns(found, base)
+        if (columns.time is None and columns.dt is None) or not columns.parts[""]:
             there = ", ".join(self._columns) or "none"
             raise ColumnMapError(
                 f"{self.path}: no vectors time_s and <channel>_<unit>; there are {there}; "
                 "say by a column map what they are"
             )
-        return replace(base, parts={"": found}, time=time)
+        return columns
 
     def numbers(self, column: str | int) -> Array:
         """``(N,)`` numbers of a variable."""

@@ -96,11 +96,11 @@ def evenly_sampled(
         sampling.increasing(time)
         if irregular == "resample":
             return [_resampled(samples, name, notes, description)]
-        pieces = [(0, time.size)]
+        spans = [(0, time.size)]
         if irregular == "split":
             bounds = [0, *sampling.gaps(time), time.size]
-            pieces = [(a, b) for a, b in zip(bounds, bounds[1:], strict=False) if b - a > 1]
-        return list(_pieces(samples, pieces, name, notes, description))
+            spans = [(a, b) for a, b in zip(bounds, bounds[1:], strict=False) if b - a > 1]
+        return list(_records(samples, spans, name, notes, description))
     except sampling.IrregularTimeError as error:
         row = samples.row(error.index)
         hint = "; a column map can say time.irregular: resample or split" if irregular == "error" else ""
@@ -116,14 +116,14 @@ def drive_from_command(channels: dict[str, Array], notes: list[str]) -> None:
         notes.append("drive: not recorded; the command is taken for it")
 
 
-def _pieces(
+def _records(
     samples: Samples,
-    pieces: Sequence[tuple[int, int]],
+    spans: Sequence[tuple[int, int]],
     name: str,
     notes: Sequence[str],
     description: Mapping[str, Any],
 ) -> Iterator[Record]:
-    for number, (first, last) in enumerate(pieces, 1):
+    for number, (first, last) in enumerate(spans, 1):
         time = samples.time[first:last]
         try:
             even = sampling.sampling(time)
@@ -138,10 +138,10 @@ def _pieces(
         if even.deviation_p99 > _WORTH_A_NOTE * even.dt:
             off = f"99 % up to {even.deviation_p99:.3g} s, at most {even.deviation_max:.3g} s"
             described["notes"] = [*notes, f"time: stamps are off the even grid of {even.dt:.6g} s: {off}"]
-        if len(pieces) > 1:
-            described["piece"] = [number, len(pieces)]
+        if len(spans) > 1:
+            described["part"] = [number, len(spans)]
         channels = {channel: values[first:last] for channel, values in samples.channels.items()}
-        title = f"{name}.{number}" if len(pieces) > 1 else name
+        title = f"{name}.{number}" if len(spans) > 1 else name
         yield Record.sampled(title, even.dt, channels, samples.path, described, samples.units)
 
 
