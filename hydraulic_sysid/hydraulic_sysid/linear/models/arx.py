@@ -21,7 +21,7 @@ from hydraulic_sysid.linear.errors import IdentificationError
 
 from .experiments import experiments, lengths_agree
 from .free_run import free_run
-from .model import coefficient_table
+from .model import LinearModel, coefficient_table
 from .poles import Pole, sampled_poles
 from .tall_least_squares import solve
 
@@ -56,43 +56,33 @@ class ArxOrder:
         return f"ARX({self.na}, {self.nb}, {self.nk})"
 
 
-@dataclass(frozen=True)
-class ArxModel:
+@dataclass(frozen=True, kw_only=True)
+class ArxModel(LinearModel):
     """An identified ARX model; see the module's docstring for the equation and signs."""
 
+    minimised = "one_step"
+
     order: ArxOrder
-    dt: float
     a: Array
     """``(na,)`` coefficients a₁ … a_na."""
     b: Array
     """``(nb,)`` coefficients b₁ … b_nb."""
     constant: float
     """c: the effect of constant offsets of input and output, 0 unless it was estimated."""
-    input_offset: float
-    """Mean of the estimation input, subtracted first; 0 unless offsets were removed."""
-    output_offset: float
     standard_errors: Array
     """``(na + nb [+ 1],)`` standard errors of a, b and, where it was estimated, c."""
-    loss: float
-    """Mean squared one-step prediction error over the estimation data."""
-    samples: int
     condition_number: float
     """Of the regression matrix with columns scaled to unit length."""
     method: str = "least squares"
 
     @property
-    def minimised(self) -> str:
-        """Which error ``loss`` is of."""
-        return "one_step"
-
-    @property
     def parameters(self) -> int:
-        """How many values were estimated."""
+        """See `LinearModel.parameters`."""
         return self.standard_errors.size
 
     @property
     def memory(self) -> int:
-        """Samples of the past that one prediction needs."""
+        """See `LinearModel.memory`."""
         return self.order.memory
 
     def coefficients(self) -> list[tuple[str, float, float]]:

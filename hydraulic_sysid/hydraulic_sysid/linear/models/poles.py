@@ -22,11 +22,6 @@ class Pole:
     """True strictly inside the unit circle or the left half plane."""
     sampled: bool = True
 
-    @property
-    def time_constant(self) -> float:
-        """1/|s| in seconds; infinite for an integrator."""
-        return float(1.0 / (2.0 * np.pi * self.natural_frequency)) if self.natural_frequency else float("inf")
-
 
 def sampled_poles(denominator: ArrayLike, dt: float) -> tuple[Pole, ...]:
     """Poles, slowest first, of a denominator in descending powers of z; ``dt`` in seconds."""

@@ -18,15 +18,17 @@ from hydraulic_sim.arrays import Array
 
 from .experiments import lengths_agree
 from .free_run import free_run
+from .model import LinearModel
 from .poles import Pole, poles_at
 from .state_recursion import propagate
 
 
-@dataclass(frozen=True)
-class StateSpaceModel:
+@dataclass(frozen=True, kw_only=True)
+class StateSpaceModel(LinearModel):
     """An identified state-space model with one input and one output; equation and signs in the module's docstring."""
 
-    dt: float
+    minimised = "free_run"
+
     A: Array
     """``(n, n)``."""
     B: Array
@@ -38,15 +40,10 @@ class StateSpaceModel:
     """``(n,)`` gain of the innovations; 0 makes the one-step prediction a free run."""
     constant: Array
     """``(n,)`` f."""
-    input_offset: float
-    output_offset: float
     singular_values: Array
     """Of the projection of future outputs on the past; a gap after the n-th says that n is the order."""
     horizon: int
-    loss: float
-    """Mean squared simulation error over the estimation data."""
     one_step_loss: float
-    samples: int
     constants: int
     """How many constant offsets were estimated, 0 or 1."""
     direct: bool
@@ -58,11 +55,6 @@ class StateSpaceModel:
     def order(self) -> int:
         """Number of states."""
         return self.C.size
-
-    @property
-    def minimised(self) -> str:
-        """Which error ``loss`` is of."""
-        return "free_run"
 
     @property
     def parameters(self) -> int:

@@ -23,7 +23,7 @@ from hydraulic_sysid.linear.errors import IdentificationError
 from .experiments import lengths_agree
 from .free_run import free_run
 from .held_filter import Filter
-from .model import coefficient_table
+from .model import LinearModel, coefficient_table
 from .poles import Pole, continuous_poles
 
 
@@ -56,13 +56,16 @@ class TransferFunctionOrder:
         return f"{names.get(self.poles, f'{self.poles}th')}-order transfer function{zeros}"
 
 
-@dataclass(frozen=True)
-class TransferFunctionModel:
-    """An identified transfer function; see the module's docstring for the equation and signs."""
+@dataclass(frozen=True, kw_only=True)
+class TransferFunctionModel(LinearModel):
+    """An identified transfer function; see the module's docstring for the equation and signs.
+
+    ``dt`` is the sampling time of the estimation data; simulations take another one.
+    """
+
+    minimised = "free_run"
 
     order: TransferFunctionOrder
-    dt: float
-    """Sampling time of the estimation data; simulations take another one."""
     numerator: Array
     """``(zeros + 1,)`` b₀ … b_m in descending powers of s."""
     denominator: Array
@@ -70,13 +73,8 @@ class TransferFunctionModel:
     delay: float
     """Dead time in seconds."""
     constant: float
-    input_offset: float
-    output_offset: float
     standard_errors: Array
     """Of the estimated coefficients: a₁ … (without the integrator's), b₀ …, c where estimated."""
-    loss: float
-    """Mean squared simulation error over the estimation data."""
-    samples: int
     condition_number: float
     noise: Array
     """``(k,)`` coefficients d₁ … d_k of the autoregression of the simulation error; may be empty."""
@@ -86,18 +84,13 @@ class TransferFunctionModel:
     converged: bool = True
 
     @property
-    def minimised(self) -> str:
-        """Which error ``loss`` is of."""
-        return "free_run"
-
-    @property
     def parameters(self) -> int:
-        """How many values of the model were estimated, initial states and the noise model left out."""
+        """See `LinearModel.parameters`."""
         return self.standard_errors.size
 
     @property
     def memory(self) -> int:
-        """Samples of the past that one prediction needs, beyond the state."""
+        """See `LinearModel.memory`."""
         return self.noise.size
 
     def transfer_function(self) -> tuple[Array, Array]:
