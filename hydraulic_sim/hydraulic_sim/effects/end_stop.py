@@ -33,13 +33,7 @@ EFFECT = Effect(
             free=False,
         ),
         Parameter(
-            "damping",
-            "N*s/m",
-            200.0,
-            (0.0, 1e8),
-            "contact damping",
-            "Nisar & Munawar, table of parameters",
-            free=False,
+            "damping", "N*s/m", 200.0, (0.0, 1e8), "contact damping", "Nisar & Munawar, table of parameters", free=False
         ),
     ),
     equation="F = -(k*d + c*v), d = |x| - stroke/2 > 0, never pulling",

@@ -18,13 +18,7 @@ EFFECT = Effect(
     kernel=force,
     parameters=(
         Parameter(
-            "stiffness",
-            "N/m",
-            3000.0,
-            (0.0, 1e9),
-            "spring rate k",
-            "a few kN at the stops of a 1.5 m stroke",
-            null=0.0,
+            "stiffness", "N/m", 3000.0, (0.0, 1e9), "spring rate k", "a few kN at the stops of a 1.5 m stroke", null=0.0
         ),
     ),
     equation="F = -k*x",

@@ -33,13 +33,7 @@ EFFECT = Effect(
             null=0.0,
         ),
         Parameter(
-            "time",
-            "s",
-            5e-3,
-            (1e-3, 1.0),
-            "filling time of the return line",
-            "a few metres of hose",
-            free=False,
+            "time", "s", 5e-3, (1e-3, 1.0), "filling time of the return line", "a few metres of hose", free=False
         ),
     ),
     equation="pt = Pt + R*q*|q|, within the line's filling time",

@@ -26,13 +26,7 @@ EFFECT = Effect(
     memory=2,
     parameters=(
         Parameter(
-            "half_gap",
-            "m",
-            2e-4,
-            (0.0, 0.02),
-            "half the play",
-            "ball joints of a sensor rod: 0.05 to 0.5 mm",
-            null=0.0,
+            "half_gap", "m", 2e-4, (0.0, 0.02), "half the play", "ball joints of a sensor rod: 0.05 to 0.5 mm", null=0.0
         ),
     ),
     equation="y_k = min(max(y_{k-1}, x_k - g), x_k + g)",

@@ -18,13 +18,7 @@ EFFECT = Effect(
     kernel=shift,
     parameters=(
         Parameter(
-            "offset",
-            "m",
-            5e-3,
-            (-1.0, 1.0),
-            "reading at true zero",
-            "mounting of an LVDT: millimetres",
-            null=0.0,
+            "offset", "m", 5e-3, (-1.0, 1.0), "reading at true zero", "mounting of an LVDT: millimetres", null=0.0
         ),
     ),
     equation="y = x + a",

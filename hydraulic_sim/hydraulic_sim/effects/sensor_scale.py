@@ -18,13 +18,7 @@ EFFECT = Effect(
     kernel=scale_reading,
     parameters=(
         Parameter(
-            "scale",
-            "1",
-            1.03,
-            (0.2, 5.0),
-            "reading over true position",
-            "LVDT data sheets: within 1 to 3 %",
-            null=1.0,
+            "scale", "1", 1.03, (0.2, 5.0), "reading over true position", "LVDT data sheets: within 1 to 3 %", null=1.0
         ),
     ),
     equation="y = c*x",

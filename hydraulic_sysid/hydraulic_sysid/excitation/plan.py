@@ -41,11 +41,7 @@ class Plan(Declared):
     travel_limit: float = number("m", "a piston further from the centre aborts the run", above=0.0, maximum=100.0)
     description: str = text("what the experiment is for", "")
     duration: float | None = number(
-        "s",
-        "of the signal, fades included; left out: the signal's own length",
-        None,
-        above=0.0,
-        maximum=3600.0,
+        "s", "of the signal, fades included; left out: the signal's own length", None, above=0.0, maximum=3600.0
     )
     rate: float = number("Hz", "samples per second of the drive", 1000.0, minimum=1.0, maximum=10000.0)
     amplitude_limit: float = number("V", "no drive goes beyond it", DRIVE_LIMIT_V, above=0.0, maximum=DRIVE_LIMIT_V)
@@ -84,9 +80,7 @@ class Plan(Declared):
         peak = float(np.max(np.abs(self.open_loop), initial=0.0))
         if peak > self.amplitude_limit * (1 + 1e-12):
             raise self.error(
-                "amplitude_limit",
-                self.amplitude_limit,
-                f"at least {peak:.6g} V, the peak of this plan's drive",
+                "amplitude_limit", self.amplitude_limit, f"at least {peak:.6g} V, the peak of this plan's drive"
             )
 
     @property

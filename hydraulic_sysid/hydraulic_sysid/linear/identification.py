@@ -16,17 +16,7 @@ from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.estimation import metrics
 from hydraulic_sysid.estimation.noise import noise_std
 
-from .models import (
-    CRITERIA,
-    Arx,
-    Candidate,
-    IdentificationError,
-    LinearModel,
-    Structure,
-    best,
-    model_file,
-    try_orders,
-)
+from .models import CRITERIA, Arx, Candidate, IdentificationError, LinearModel, Structure, best, model_file, try_orders
 from .validation import residual_tests
 
 _UNSTABLE = 1.01  # |z|; an estimated integrator may come out a little beyond 1

@@ -49,11 +49,7 @@ def offered_qos(depth: int, latched: bool) -> dict[str, Any]:
 
 
 def information(
-    file: str,
-    topics: Sequence[tuple[BagTopic, int]],
-    start_ns: int,
-    duration_ns: int,
-    custom_data: Mapping[str, str],
+    file: str, topics: Sequence[tuple[BagTopic, int]], start_ns: int, duration_ns: int, custom_data: Mapping[str, str]
 ) -> dict[str, Any]:
     """Content of metadata.yaml below its root key, for a bag of one file and `topics` with message counts."""
     span = {

@@ -1,13 +1,6 @@
 """Records: what was measured in one experiment, and how it is read from bags, CSV and MAT files."""
 
-from hydraulic_sysid.data.errors import (
-    BagError,
-    ChannelError,
-    ColumnMapError,
-    FileError,
-    RecordError,
-    TimeError,
-)
+from hydraulic_sysid.data.errors import BagError, ChannelError, ColumnMapError, FileError, RecordError, TimeError
 from hydraulic_sysid.data.records.channels import CHANNELS, Channel
 from hydraulic_sysid.data.records.column_map import ColumnMap, load_column_map, parse_column_map, shipped_maps
 from hydraulic_sysid.data.records.reading import read_all, read_records

@@ -117,11 +117,7 @@ def drive_from_command(channels: dict[str, Array], notes: list[str]) -> None:
 
 
 def _records(
-    samples: Samples,
-    spans: Sequence[tuple[int, int]],
-    name: str,
-    notes: Sequence[str],
-    description: Mapping[str, Any],
+    samples: Samples, spans: Sequence[tuple[int, int]], name: str, notes: Sequence[str], description: Mapping[str, Any]
 ) -> Iterator[Record]:
     for number, (first, last) in enumerate(spans, 1):
         time = samples.time[first:last]

@@ -23,11 +23,7 @@ from .transfer_function import TransferFunctionModel, TransferFunctionOrder
 
 FORMAT = "hydraulic-linear-model-2"
 _READABLE = (FORMAT, "hydraulic-linear-model-1")  # whose figures on test data stand under another key
-_KINDS: dict[type, str] = {
-    ArxModel: "arx",
-    TransferFunctionModel: "transfer function",
-    StateSpaceModel: "state space",
-}
+_KINDS: dict[type, str] = {ArxModel: "arx", TransferFunctionModel: "transfer function", StateSpaceModel: "state space"}
 
 
 def document(model: LinearModel, **about: Any) -> dict[str, Any]:
