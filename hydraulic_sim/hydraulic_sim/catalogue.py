@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from . import slots
-from .effect import Effect, Parameter
+from .effect import Effect
 from .registry import Library
+
+_EFFECT = ("name", "summary", "slot", "always_on", "equation", "source", "excited_by", "told_apart_by", "memory")
+_PARAMETER = ("name", "unit", "default", "null", "free", "description", "source")
 
 
 def describe(library: Library, name: str) -> dict[str, object]:
@@ -15,34 +18,15 @@ def describe(library: Library, name: str) -> dict[str, object]:
     effect = library[name]
     slot = slots.SLOTS[effect.slot]
     return {
-        "name": effect.name,
-        "summary": effect.summary,
-        "slot": effect.slot,
+        **{key: getattr(effect, key) for key in _EFFECT},
         "subsystem": slot.subsystem,
         "kind": slot.kind,
-        "always_on": effect.always_on,
-        "equation": effect.equation,
-        "source": effect.source,
-        "excited_by": effect.excited_by,
         "confused_with": list(effect.confused_with),
-        "told_apart_by": effect.told_apart_by,
-        "parameters": [_parameter(p) for p in effect.parameters],
+        "parameters": [
+            {**{key: getattr(p, key) for key in _PARAMETER}, "bounds": list(p.bounds)} for p in effect.parameters
+        ],
         "states": [{"name": s.name, "unit": s.unit, "kind": s.kind} for s in effect.states],
-        "memory": effect.memory,
         "file": str(library.source_file(name)),
-    }
-
-
-def _parameter(parameter: Parameter) -> dict[str, object]:
-    return {
-        "name": parameter.name,
-        "unit": parameter.unit,
-        "default": parameter.default,
-        "bounds": list(parameter.bounds),
-        "null": parameter.null,
-        "free": parameter.free,
-        "description": parameter.description,
-        "source": parameter.source,
     }
 
 

@@ -10,8 +10,7 @@ from hydraulic_sim.linear import operating_point
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
-from hydraulic_sysid.excitation.plan import Plan
-from hydraulic_sysid.excitation.prediction import Prediction
+from hydraulic_sysid.excitation.plan import Plan, Prediction
 from hydraulic_sysid.excitation.simulated_run import SimulatedRun, simulate_plan
 
 _TRAVEL_SHARE = 0.8

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 
 from hydraulic_interfaces.contract import ABORTED, EXCITATION_NODE, FINISHED, STARTED
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_sysid.excitation.applied import AppliedDriveCheck
-from hydraulic_sysid.excitation.events import experiment_event
 from hydraulic_sysid.excitation.plan import Plan
 from hydraulic_sysid.excitation.plant_report import PlantReport
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
@@ -107,7 +107,7 @@ class Session:
         self.run, self.armed, self.ended = run, None, None
         self._announced, self._started_ns = False, self._stamp_ns
         self.plant.forget()
-        self._emit(experiment_event(STARTED, run, self._started_ns, self._stamp_ns))
+        self._emit(_event(STARTED, run, self._started_ns, self._stamp_ns))
 
     def _announce(self, run: ExcitationRun) -> None:
         if self._announced or run.phase is Phase.STOPPING:
@@ -117,4 +117,25 @@ class Session:
         if run.phase is Phase.ABORTED:
             kind, reason = ABORTED, "; the plant says: ".join(filter(None, (run.reason, self.plant.trouble)))
         self.last_end = f"{run.plan.name} {kind}" + (f": {reason}" if reason else "")
-        self._emit(experiment_event(kind, run, self._started_ns, self._stamp_ns, reason))
+        self._emit(_event(kind, run, self._started_ns, self._stamp_ns, reason))
+
+
+def _event(kind: str, run: ExcitationRun, started_ns: int, stamp_ns: int, reason: str = "") -> str:
+    """One event: `kind` at `stamp_ns`, of the run that began with the state of `started_ns`.
+
+    `kind` is STARTED, FINISHED or ABORTED of the contract.
+
+    Keys: event, stamp_ns, started_ns (the same in all events of a run), reason (of an abort), samples and
+    played (how many the plan has, and how many of them were commanded), plan (complete: `Plan.from_mapping`
+    gives it back).
+    """
+    content = {
+        "event": kind,
+        "stamp_ns": stamp_ns,
+        "started_ns": started_ns,
+        "reason": reason,
+        "samples": run.plan.time.size,
+        "played": run.played,
+        "plan": run.plan.as_mapping(),
+    }
+    return json.dumps(content, allow_nan=False, ensure_ascii=False)

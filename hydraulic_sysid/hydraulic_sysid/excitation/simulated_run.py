@@ -10,8 +10,7 @@ from hydraulic_interfaces.contract import STARTED
 from hydraulic_sim.live import LivePlant
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.excitation.plan import Plan
-from hydraulic_sysid.excitation.prediction import Prediction
+from hydraulic_sysid.excitation.plan import Plan, Prediction
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
 
 _CHANNELS = ("position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool", "force", "drive")

@@ -14,7 +14,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.estimation.segments import MEASURED
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.amplitude import Limits
-from hydraulic_sysid.excitation.prediction import Prediction
+from hydraulic_sysid.excitation.plan import Prediction
 from hydraulic_sysid.excitation.simulated_run import SimulatedRun
 
 from . import plan_file

@@ -12,7 +12,7 @@ from hydraulic_sim.linear import operating_point
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant, PlantState, Trajectory
 from hydraulic_sysid.excitation.amplitude import Limits
-from hydraulic_sysid.excitation.prediction import Prediction
+from hydraulic_sysid.excitation.plan import Prediction
 
 from .movements import Bench, Movement
 
