@@ -159,6 +159,29 @@ def test_the_controller_runs_without_the_simulation() -> None:
     subprocess.run([sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": path}, check=True, timeout=100)
 
 
+def private_imports(file: Path, text: str) -> list[str]:
+    """Imports of private modules or names of our packages."""
+    return [
+        f"{file}:{node.lineno} imports {node.module}.{alias.name}"
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in BELOW
+        for alias in node.names
+        if any(part.startswith("_") for part in (*str(node.module).split("."), alias.name))
+    ]
+
+
+@pytest.mark.parametrize("folder", ["tests", "benchmarks", "examples"])
+def test_what_is_private_is_not_imported_from_outside(folder: str) -> None:
+    files = sorted((ROOT / folder).rglob("*.py"))
+    assert files
+    assert [v for file in files for v in private_imports(file, file.read_text("utf-8"))] == []
+
+
+def test_the_private_rule_sees() -> None:
+    text = "from hydraulic_sim.plant import Plant, _run\nfrom hydraulic_sysid.verbs._options import run"
+    assert len(private_imports(Path("test_x.py"), text)) == 2
+
+
 def test_every_package_has_modules() -> None:
     assert all(list(modules(package)) for package in BELOW)
 

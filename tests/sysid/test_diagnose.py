@@ -18,9 +18,9 @@ from hydraulic_sysid.diagnosis.search.search import (
     CandidateRefit,
     SearchResult,
     SearchState,
-    _absorbs,
-    _varied,
-    _without_competitor,
+    absorbs_discrepancy,
+    varied,
+    without_competitor,
 )
 from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
 from hydraulic_sysid.estimation.fit import FitSettings
@@ -143,7 +143,7 @@ def at(total: float) -> Misfit:
 )
 def test_what_a_law_leaves_is_no_effect(model, name: str, left: float, absorbs: bool) -> None:
     base, before = state(model, 1.0e6, {}), state(model, 5500.0, {})
-    assert _absorbs(base, before, ["valve_deadband"], name, at(left)) is absorbs
+    assert absorbs_discrepancy(base, before, ["valve_deadband"], name, at(left)) is absorbs
 
 
 @pytest.mark.parametrize(
@@ -174,12 +174,12 @@ def test_what_an_effect_leaves_decides_whether_it_is_the_one(model, before: floa
 )
 def test_a_candidate_that_no_other_comes_near_has_no_competitor(model, own, other, final, alone) -> None:
     base = state(model, 1e6, {"valve_deadband": own, "backlash": other})
-    assert _without_competitor(base, state(model, final, {}), "valve_deadband") is alone
+    assert without_competitor(base, state(model, final, {}), "valve_deadband") is alone
 
 
 def test_later_refits_are_not_all_of_one_subsystem(model) -> None:
     names = ("spool_dynamics", "command_delay", "spool_rate_limit", "entrained_air")
-    found = _varied([CandidateScore(model.library[name], 1.0, {}) for name in names], 2)
+    found = varied([CandidateScore(model.library[name], 1.0, {}) for name in names], 2)
     assert [p.effect.name for p in found] == ["spool_dynamics", "command_delay", "entrained_air"]
 
 

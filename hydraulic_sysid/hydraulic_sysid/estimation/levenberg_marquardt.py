@@ -58,7 +58,8 @@ class Point(Protocol):
     """Where a fit stands."""
 
     @property
-    def parameters(self) -> Parameters: ...
+    def parameters(self) -> Parameters:
+        """Those that are fitted, at their values."""
 
     @property
     def cost(self) -> float:

@@ -25,8 +25,10 @@ class Direction:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard errors [SI, inf where there is no influence], correlations (P, P), condition number of the scaled
-    information, and what is not identifiable."""
+    """Standard errors [SI, inf where there is no influence], correlations (P, P) and what is not identifiable.
+
+    The condition number is that of the scaled information.
+    """
 
     standard_errors: dict[str, float]
     correlation: Array

@@ -41,6 +41,7 @@ class Design:
     refits: Sequence[CrossFit]
 
     def name(self, point: int) -> str:
+        """Name of a model by its number."""
         return self.search.points[point].name
 
 

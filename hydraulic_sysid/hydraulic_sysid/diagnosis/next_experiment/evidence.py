@@ -102,7 +102,7 @@ def evidence(
 ) -> Evidence:
     """What an experiment shows, ``record`` being what the first point does in it.
 
-    Raises `hydraulic_sim.errors.SimulationError` where a model cannot follow.
+    :raises SimulationError: a model cannot follow.
     """
     linear, columns = [], []
     cuts = segments(record, points[0].plant, length, noise)

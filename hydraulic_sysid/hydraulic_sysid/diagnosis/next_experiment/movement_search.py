@@ -51,10 +51,14 @@ class MovementSearch:
 
     @property
     def pairs(self) -> list[Pair]:
+        """Pairs of models that the experiment is to tell apart."""
         return pairs(self.points, self.first)
 
     def candidates(self, say: Say) -> list[JudgedMovement]:
-        """Every movement that can be made to keep the limits. Raises `NextExperimentError` if there is none."""
+        """Every movement that can be made to keep the limits.
+
+        :raises NextExperimentError: there is none.
+        """
         allowed: list[tuple[Movement, str]] = []
         found: list[JudgedMovement] = []
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
@@ -101,7 +105,10 @@ class MovementSearch:
         return None
 
     def largest_part(self, movement: Movement) -> tuple[float, str]:
-        """The largest part of a limit that any model uses, and of which. Raises `SimulationError`."""
+        """The largest part of a limit that any model uses, and of which.
+
+        :raises SimulationError: a model cannot follow.
+        """
         lead = self.points[0]
         played = play(lead.plant, Leader.of(lead.model), [movement], self.bench)
         worst, limit = 0.0, ""

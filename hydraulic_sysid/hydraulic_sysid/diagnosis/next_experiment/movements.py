@@ -43,8 +43,10 @@ class Bench:
 
 @dataclass(frozen=True)
 class Phase:
-    """A part of a movement: drives ``drive`` (N,) [V] as given, or the way to ``target`` [m] with at most ``most`` [V]
-    for ``samples`` samples."""
+    """A part of a movement of ``samples`` samples.
+
+    It drives ``drive`` (N,) [V] as given, or the way to ``target`` [m] with at most ``most`` [V].
+    """
 
     samples: int
     drive: Array | None = None
@@ -54,8 +56,10 @@ class Phase:
 
 @dataclass(frozen=True)
 class Family:
-    """A kind of movement: what it is in words, the range of each of its numbers, those to begin with, and how a
-    bench plays it. ``size`` is the number that a limit makes smaller, ``reach`` the one that the travel does."""
+    """A kind of movement: in words, the range of each of its numbers, those to begin with, and how a bench plays it.
+
+    ``size`` is the number that a limit makes smaller, ``reach`` the one that the travel does.
+    """
 
     words: str
     ranges: Mapping[str, tuple[float, float]]
@@ -74,6 +78,7 @@ class Movement:
 
     @property
     def family(self) -> Family:
+        """Its kind."""
         return FAMILIES[self.kind]
 
     def phases(self, bench: Bench) -> list[Phase]:

@@ -55,7 +55,7 @@ def make(played: Played, limits: Limits, centre: float, rate: float, folder: Pat
 def save(plan: Plan, folder: Path) -> Path:
     """Write plan file and drive into a folder, side by side: they may be moved together. Returns the plan file.
 
-    Raises `NextExperimentError` where one of them exists.
+    :raises NextExperimentError: one of them exists.
     """
     assert isinstance(plan.signal, Playback)
     file, drive = folder / f"{NAME}.yaml", folder / f"{NAME}.csv"

@@ -46,8 +46,10 @@ class Proposal:
     document: dict[str, Any]
 
     def save(self, folder: Path) -> Path:
-        """Write plan file and drive (CSV) side by side. Returns the plan file. Raises `NextExperimentError` where one
-        of them exists."""
+        """Write plan file and drive (CSV) side by side. Returns the plan file.
+
+        :raises NextExperimentError: one of them exists.
+        """
         return plan_file.save(self.plan, folder)
 
 
@@ -98,7 +100,7 @@ def next_experiment(
     to spare; ``noise``: standard deviation of each measured channel [m, Pa]; ``centre`` [m]: where the piston starts;
     ``rate`` [Hz]; ``segment_length`` [s]: of the segments in which the models are fitted afterwards.
 
-    Raises `NextExperimentError`: fewer than two models, no movement within the limits, values that make no sense.
+    :raises NextExperimentError: fewer than two models, no movement within the limits, values that make no sense.
     """
     _check(models, noise, seconds)
     say = progress or (lambda _: None)

@@ -33,7 +33,7 @@ class Leader:
     def of(cls, model: Model) -> Leader:
         """For a valve-driven piston, which integrates, or a mass under a force proportional to the drive.
 
-        Raises `hydraulic_sim.errors.SimulationError` where the model has no steady motion.
+        :raises SimulationError: the model has no steady motion.
         """
         if model.kind == "mechanical":
             inertia = model.value("moving_mass") / model.value("drive_force")
@@ -54,7 +54,7 @@ class Played:
 def play(plant: Plant, leader: Leader, movements: Sequence[Movement], bench: Bench) -> Played:
     """The drive of movements one after the other, from rest at the bench's centre.
 
-    Raises `hydraulic_sim.errors.SimulationError`.
+    :raises SimulationError: the model cannot follow.
     """
     dt = 1.0 / bench.rate
     start = state = plant.initial_state(position=bench.centre)

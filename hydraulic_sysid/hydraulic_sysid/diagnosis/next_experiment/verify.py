@@ -64,8 +64,11 @@ class CrossFit:
 def simulated_runs(
     plan: Plan, points: Sequence[Point], limits: Limits, centre: float
 ) -> tuple[list[SimulatedRun], float, str]:
-    """The plan played on every model by the code that plays it on the bench; the largest part of a limit that is used,
-    and of which. Raises `hydraulic_sim.errors.SimulationError`."""
+    """The plan played on every model by the code that plays it on the bench.
+
+    :return: the runs, the largest part of a limit that is used, and of which limit
+    :raises SimulationError: a model cannot follow.
+    """
     found, worst, limit = [], 0.0, ""
     for point in points:
         seen = simulate_plan(plan, point.plant)
@@ -88,7 +91,10 @@ def refits(
     noise: Mapping[str, float],
     length: float,
 ) -> list[CrossFit]:
-    """Every pair of ``chosen``, the first of it by its simulated run in ``seen``. Raises as a calibration does."""
+    """Every pair of ``chosen``, the first of it by its simulated run in ``seen``.
+
+    :raises HydraulicError: as a calibration.
+    """
     records = [_played(s.record, plan, list(noise)) for s in seen]
 
     def fitted(number: int, record: Record, keys: Sequence[str]) -> Fit:

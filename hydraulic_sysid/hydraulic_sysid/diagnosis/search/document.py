@@ -118,8 +118,11 @@ def with_balances(
     after: Sequence[Mapping[str, Any]],
     suspected: Sequence[str],
 ) -> dict[str, Any]:
-    """The document with balances. ``suspected``: subsystems by what they explain of them, the most first; it says where
-    something outside the library is, unless a curve explains most of that."""
+    """The document with balances.
+
+    :param suspected: subsystems by what they explain of them, the most first; it says where something outside the
+        library is, unless a curve explains most of that
+    """
     later = {b["name"]: b["ratio"] for b in after}
     keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
     rows = [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]

@@ -32,8 +32,10 @@ _ROUNDED = 6  # the same where what is measured is rounded, and the sensitivitie
 
 @dataclass(frozen=True)
 class Refit:
-    """A model refitted: ``costs[i]`` (S_i,) sums of squares of every segment, and, of `as_it_is`, ``residual[i]``
-    (S_i, m): what is left."""
+    """A model refitted: ``costs[i]`` (S_i,) sums of squares of every segment.
+
+    Of `as_it_is` also ``residual[i]`` (S_i, m): what is left.
+    """
 
     model: Model
     costs: list[Array]

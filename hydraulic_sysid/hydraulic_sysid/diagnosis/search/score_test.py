@@ -27,8 +27,10 @@ ENOUGH = 50  # segments that do for a look, spread over all records
 
 @dataclass(frozen=True)
 class CandidateScore:
-    """A candidate and the best its probes predict: ``reduction`` of the sum of squares, and the values to ``start`` a
-    refit from [SI, by key]."""
+    """A candidate and the best its probes predict.
+
+    ``reduction`` of the sum of squares, and the values to ``start`` a refit from [SI, by key].
+    """
 
     effect: Effect
     reduction: float

@@ -155,7 +155,7 @@ class Search:
         if not scores:
             return base
         least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)
-        best = _varied([s for s in scores if s.reduction > least], ALIKE if most < MOST_REFITS else most)[:most]
+        best = varied([s for s in scores if s.reduction > least], ALIKE if most < MOST_REFITS else most)[:most]
         refits = sorted((self.refit(base, s) for s in best), key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
 
@@ -239,7 +239,7 @@ class Search:
         swaps, queue = 0, added
         while queue:
             name, queue = queue[0], queue[1:]
-            if len(added) == 1 or _without_competitor(base, state, name):
+            if len(added) == 1 or without_competitor(base, state, name):
                 competing = {**competing, name: base}
                 continue
             without = self.state(state.model.without_effect(name), self._last)
@@ -285,9 +285,12 @@ def _with_values(model: Model, fitted: Model) -> Model:
 
 
 def _worth(base: SearchState, before: SearchState, added: Sequence[str], name: str, after: Misfit, part: float) -> bool:
-    """Whether a further effect explains enough (times ``part``): a good part of what is left, or something of what
-    there was, where the others explain most of it. What explains little where most is left would be a proxy."""
-    if _absorbs(base, before, added, name, after, part):
+    """Whether a further effect explains enough (times ``part``).
+
+    That is a good part of what is left, or something of what there was, where the others explain most of it. What
+    explains little where most is left would be a proxy.
+    """
+    if absorbs_discrepancy(base, before, added, name, after, part):
         return False
     if explained(before.misfit, after) >= part * FURTHER:
         return True
@@ -295,7 +298,7 @@ def _worth(base: SearchState, before: SearchState, added: Sequence[str], name: s
     return most and explained(base.misfit, after) - explained(base.misfit, before.misfit) >= part * NEEDED
 
 
-def _absorbs(
+def absorbs_discrepancy(
     base: SearchState, before: SearchState, others: Sequence[str], name: str, after: Misfit, part: float = 1.0
 ) -> bool:
     """Whether an effect explains so little of all that it may only absorb the discrepancy of the others' laws.
@@ -312,7 +315,7 @@ def _absorbs(
 
 def _superfluous(base: SearchState, without: SearchState, state: SearchState, name: str, others: Sequence[str]) -> bool:
     """Whether ``state`` is hardly better than ``without`` the effect."""
-    if not material(without.misfit, state.misfit) or _absorbs(base, without, others, name, state.misfit):
+    if not material(without.misfit, state.misfit) or absorbs_discrepancy(base, without, others, name, state.misfit):
         return True
     lost = without.misfit.total - state.misfit.total
     needed = NEEDED * (base.misfit.total - state.misfit.total)
@@ -332,15 +335,17 @@ def _anything(name: str, after: Misfit, part: float) -> bool:
     return True
 
 
-def _varied(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
+def varied(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
     """In their order, and no more than so many of one subsystem."""
     places = [subsystem(f.effect) for f in found]
     return [f for i, f in enumerate(found) if places[:i].count(places[i]) < most]
 
 
-def _without_competitor(base: SearchState, final: SearchState, name: str) -> bool:
-    """Whether an effect explains by itself most of what is off, and no other candidate comes near it: by what they
-    explain or, where in the end all is explained, by what they leave."""
+def without_competitor(base: SearchState, final: SearchState, name: str) -> bool:
+    """Whether an effect explains by itself most of what is off, and no other candidate comes near it.
+
+    That is judged by what they explain or, where in the end all is explained, by what they leave.
+    """
     own = next((r.misfit for r in base.refits if r.name == name), None)
     if own is None or base.misfit.total - own.total < MOSTLY * base.misfit.excess:
         return False

@@ -29,8 +29,11 @@ LARGE = 1.03  # residual over noise from which something is missing although no 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a search says: its ``kind``; per effect added the ``competing`` models, and the ``family`` of effects that
-    these channels cannot distinguish from it, however well one of them fits."""
+    """What a search says: its ``kind``, and the effects ``added``.
+
+    Per effect added the ``competing`` models, and the ``family`` of effects that these channels cannot distinguish from
+    it, however well one of them fits.
+    """
 
     kind: str
     added: Sequence[str]
