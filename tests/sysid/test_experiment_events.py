@@ -10,7 +10,7 @@ import pytest
 
 from hydraulic_interfaces.contract import ABORTED, FINISHED, STARTED
 from hydraulic_sysid.data.bag import experiment
-from hydraulic_sysid.excitation import Plan, events, session
+from hydraulic_sysid.excitation import Plan, session
 from hydraulic_sysid.excitation.run import ExcitationRun
 from hydraulic_sysid.excitation.signals.steps import Steps
 
@@ -23,12 +23,12 @@ def test_the_recorder_understands_the_events_of_a_run(end: str, monkeypatch: pyt
     log, run = experiment.ExperimentLog(), ExcitationRun(PLAN)
     for kind, stamp in ((STARTED, 10), (end, 20)):
         assert not log.ended
-        log.take(events.experiment_event(kind, run, 10, stamp).encode())
+        log.take(session.experiment_event(kind, run, 10, stamp).encode())
     assert (log.ended, log.outcome, log.end_ns) == (True, end, 20)
     assert [json.loads(text)["event"] for text in log.custom_data().values()] == [STARTED, end]
 
 
-@pytest.mark.parametrize("module", [experiment, events, session])
+@pytest.mark.parametrize("module", [experiment, session])
 def test_the_names_stand_in_the_contract_alone(module: ModuleType) -> None:
     source = inspect.getsource(module)
     assert [name for name in (STARTED, FINISHED, ABORTED) if f'"{name}"' in source] == []

@@ -107,7 +107,7 @@ class Session:
         self.run, self.armed, self.ended = run, None, None
         self._announced, self._started_ns = False, self._stamp_ns
         self.plant.forget()
-        self._emit(_event(STARTED, run, self._started_ns, self._stamp_ns))
+        self._emit(experiment_event(STARTED, run, self._started_ns, self._stamp_ns))
 
     def _announce(self, run: ExcitationRun) -> None:
         if self._announced or run.phase is Phase.STOPPING:
@@ -117,10 +117,10 @@ class Session:
         if run.phase is Phase.ABORTED:
             kind, reason = ABORTED, "; the plant says: ".join(filter(None, (run.reason, self.plant.trouble)))
         self.last_end = f"{run.plan.name} {kind}" + (f": {reason}" if reason else "")
-        self._emit(_event(kind, run, self._started_ns, self._stamp_ns, reason))
+        self._emit(experiment_event(kind, run, self._started_ns, self._stamp_ns, reason))
 
 
-def _event(kind: str, run: ExcitationRun, started_ns: int, stamp_ns: int, reason: str = "") -> str:
+def experiment_event(kind: str, run: ExcitationRun, started_ns: int, stamp_ns: int, reason: str = "") -> str:
     """One event: `kind` at `stamp_ns`, of the run that began with the state of `started_ns`.
 
     `kind` is STARTED, FINISHED or ABORTED of the contract.
