@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -35,7 +35,7 @@ SENSORS = {
 BUS = "bench"
 # Nothing can break here, and a laptop that holds a process up for longer than the bench's 50 ms should not end a demo.
 WATCHDOG_S = 0.2
-SILENCE_S = 10.0  # of the plant, until the excitation aborts
+SILENCE_S = 10.0  # of a plant in lockstep, until the excitation aborts
 FASTEST = 10.0  # plant seconds per second of a simulator in lockstep, where the answers come so fast
 # A simulated actuator may be excited again after an abort, also behind virtual CAN devices.
 ATTEMPTS = 2
@@ -64,10 +64,11 @@ class Steps(Protocol):
 
 @dataclass(frozen=True)
 class Experiment:
-    """One excitation plan (a file), and the name of its bag."""
+    """One excitation plan (a file), the name of its bag, and the silence [s] of the plant that aborts it."""
 
     name: str
     plan: Path
+    state_timeout: float = 0.5
 
 
 def run(
@@ -77,6 +78,8 @@ def run(
 
     :raises DemoError: a step failed; every process that was started has been ended.
     """
+    if lockstep:
+        experiments = [replace(experiment, state_timeout=SILENCE_S) for experiment in experiments]
     module = PLANTS[plant]
     package = module.partition(".")[0]
     if find_spec(package) is None or find_spec(f"{package}.nodes") is None or find_spec(module) is None:
@@ -212,7 +215,7 @@ def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, st
     excitation = crew.start(
         f"excitation_{suffix}", "hydraulic_sysid.nodes.excitation", "--ros-args",
         "-p", f"plan:={experiment.plan}", "-p", "autostart:=true", "-p", "exit_when_done:=true",
-        "-p", f"start_timeout:={_STEP_S}", "-p", "listeners:=2", "-p", f"state_timeout:={SILENCE_S}",
+        "-p", f"start_timeout:={_STEP_S}", "-p", "listeners:=2", "-p", f"state_timeout:={experiment.state_timeout}",
     )  # fmt: skip
     excitation.may_end = (0, 1)  # 1: not started, or aborted
     recorder.may_end = (0,)
