@@ -67,7 +67,7 @@ def main() -> int:
         path = patient_file(Path(folder))
         bus = load_bus(path)
         fault = StatusFault("valve")
-        lockstep = "lockstep:=true" in sys.argv
+        lockstep = "--lockstep" in sys.argv
         with VirtualBench(bus, open_can(bus.interface, bus.channel), Actuator("sample_bench"), lockstep) as devices:
             devices.listeners.append(tell)
             signal.signal(signal.SIGUSR1, lambda *_: devices.inject(fault))

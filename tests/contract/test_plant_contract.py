@@ -32,8 +32,9 @@ def start(request: pytest.FixtureRequest, launch: Any, compiled_physics: None) -
     """Starts the plant under test with further ROS arguments."""
     target, *arguments = PLANTS[request.param]
 
-    def run(*ros: str, autostart: bool = True) -> Any:
-        return launch(target, *arguments, *(["--autostart"] if autostart else []), "--ros-args", *ros)
+    def run(*ros: str, autostart: bool = True, lockstep: bool = False) -> Any:
+        options = [name for name, on in (("--autostart", autostart), ("--lockstep", lockstep)) if on]
+        return launch(target, *arguments, *options, "--ros-args", *ros)
 
     return run
 
@@ -177,7 +178,7 @@ def test_in_lockstep_each_sample_has_the_drive_that_answers_the_one_before(
     from hydraulic_interfaces.conversions import command_to_message
     from hydraulic_interfaces.samples import Command
 
-    start("-p", "lockstep:=true", "-p", "enable_on_activate:=true")
+    start("-p", "enable_on_activate:=true", lockstep=True)
     command, states = client.publisher("command"), []
 
     def drive(stamp_ns: int) -> float:

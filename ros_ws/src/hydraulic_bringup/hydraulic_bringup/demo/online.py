@@ -41,7 +41,7 @@ FASTEST = 10.0  # plant seconds per second of a simulator in lockstep, where the
 ATTEMPTS = 2
 _CLIENT = "hydraulic_bringup.nodes._graph_client"
 _START_S = 90.0  # the first start on a machine compiles the physics
-_STEP_S = 20.0
+_STEP_S = 60.0
 _STRETCHED = 20.0  # by how much a busy machine may stretch an experiment
 _LAST_WORDS_S = 3.0
 

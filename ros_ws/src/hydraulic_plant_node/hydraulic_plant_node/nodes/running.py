@@ -32,8 +32,9 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     """
     parser = command_line.parser(description, parameters_of(backend))
     parser.add_argument("--autostart", action="store_true", help="configure and activate at start")
+    parser.add_argument("--lockstep", action="store_true", help="plant time waits for the answer to each state")
     options = command_line.start(parser, argv)
-    overrides = [Parameter("autostart", value=True)] if options.autostart else []
+    overrides = [Parameter(name, value=True) for name in ("autostart", "lockstep") if getattr(options, name)]
     try:
         node = PlantNode(backend, parameter_overrides=overrides)
     except (ParameterException, ValueError) as error:
