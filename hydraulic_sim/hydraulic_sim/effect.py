@@ -31,7 +31,7 @@ class Parameter:
     ``null`` is the value at which the effect contributes exactly nothing; ``None`` marks a shape parameter, which
     has no such value of its own. ``free`` says whether a fit may move it unless a model file says otherwise.
     ``required`` marks a base parameter for which no default is sensible: a model file must give it. ``nuisance``
-    marks one that only smooths a law where it has a corner: no data sheet tells it, a diagnosis fits it along.
+    marks one that only smooths a law where it has a corner: no data sheet states it, a diagnosis fits it too.
     ``observed`` names what of a record shows the value by itself: "resolution", the step between position readings.
     """
 
@@ -89,7 +89,7 @@ class Effect:
     ``order`` sorts effects within a slot. ``step_rate`` estimates the fastest rate [1/s] that the effect brings, from
     parameters alone, so that the integrator's step can follow it; ``reach`` says how far back [s] its memory must go
     (one value per sample; without it the memory may keep what is long past). ``always_on`` marks base physics.
-    ``alike_without_pressures`` names the family whose members drive and position alone cannot tell apart.
+    ``alike_without_pressures`` names the family whose members drive and position alone cannot distinguish.
     """
 
     slot: str

@@ -110,7 +110,7 @@ def largest(plan: Plan, model: Model, limits: Limits | None = None, share: float
         if not low < factor < high:
             factor = 0.5 * (low + high)
         if best is None and step > 0:
-            factor = min(factor, 0.6 * high)  # a pressure that lies at its least already does not tell by how much
+            factor = min(factor, 0.6 * high)  # a pressure that lies at its least already does not show by how much
     if best is None:
         raise ExcitationError(
             f"{plan.name}: no amplitude down to {factor * peak:.3g} V keeps within the limits; {limit} breaks first: "

@@ -1,4 +1,4 @@
-"""Declared values: what a plan and a signal are told, with unit, range and meaning beside each name.
+"""Declared values: what a plan and a signal are given, with unit, range and meaning beside each name.
 
 A declared class is a frozen dataclass whose fields are made by `number`, `integer`, `numbers`, `choice`, `text` and
 `path`. The declarations do the checking, so that a YAML file, a ROS parameter and a call from Python are refused for

@@ -20,7 +20,7 @@ NOT_STARTED = "not started"
 class Session:
     """Arms plans, starts each when the plant is ready for it, plays it, and reports how it ended.
 
-    `emit` takes the events (JSON); `listeners` tells how many subscribers the commands have. Times `now` are
+    `emit` takes the events (JSON); `listeners` says how many subscribers the commands have. Times `now` are
     seconds of a steady clock: silence is measured there, so that a process which was held up for a moment,
     with its states still waiting, does not take itself for deserted.
     """

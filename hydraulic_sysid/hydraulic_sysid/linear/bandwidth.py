@@ -8,7 +8,7 @@ frequencies. It says how fast valve and oil follow, and lies beyond the hydrauli
 
 *Position bandwidth*: the first frequency at which the closed position loop T = K·G/(1 + K·G) under proportional control
 lies 3 dB below 1, with K half the critical gain (where the phase of G passes −180°): the gain of Ziegler and Nichols
-[1], a gain margin of 6 dB. It says how fast the actuator can be told to move, with the damping it has.
+[1], a gain margin of 6 dB. It says how fast the actuator can be commanded to move, with the damping it has.
 
 The excitation is chosen from the *position bandwidth*. The models are made for position control, which acts up to
 there; 0.1 … 2 times the velocity bandwidth would be 6 … 110 Hz, where the piston moves by fractions of a millimetre and

@@ -40,7 +40,7 @@ class IdentificationSettings:
 
 @dataclass(frozen=True)
 class _Series:
-    """One stretch of a record at the model's sampling time."""
+    """A record, or the part of one that is used, at the model's sampling time."""
 
     record: Record
     u: Array

@@ -2,7 +2,7 @@
 
 Messages of a stream differ only in their numbers: the layout of one, found by walking through it, holds for all
 that have the same texts and lengths. CDR (OMG formal/2021-11-01, 7.4.1): every primitive is aligned to its size,
-counted from the end of the 4-byte encapsulation header; texts and sequences are led by their length.
+counted from the end of the 4-byte encapsulation header; texts and sequences begin with their length.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class Continuity:
 
 
 class Gaps:
-    """Counts what is missing in one topic of a file, where nothing tells how many publishers it had."""
+    """Counts what is missing in one topic of a file, whose number of publishers is not known."""
 
     def __init__(self) -> None:
         self._missing = 0
@@ -43,5 +43,5 @@ class Gaps:
 
     @property
     def missing(self) -> int | None:
-        """Messages missing between the first and the last one; None where the numbers do not tell."""
+        """Messages missing between the first and the last one; None where the numbers do not show it."""
         return self._missing if self._one_publisher else None

@@ -1,4 +1,4 @@
-"""What the topic `experiment` has told of the run that a bag holds."""
+"""What the topic `experiment` says of the run that a bag holds."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ class Recording:
                 if time.monotonic() >= flush_at:
                     self._writer.flush()
                     flush_at = time.monotonic() + FLUSH_S
-        except Exception as error:  # told to whoever owns the recording; a thread has nobody else to tell
+        except Exception as error:  # whoever owns the recording finds it there; a thread has nobody to raise it to
             self.error = error
             self._writer.abandon()
 

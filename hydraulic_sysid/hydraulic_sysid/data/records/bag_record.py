@@ -93,11 +93,11 @@ def _plant(bag: Bag) -> dict[str, Any]:
     stream = bag.streams.get(topic("description"))
     for payload in reversed(stream.payloads if stream else ()):
         try:
-            told = json.loads(string_data(payload))
+            said = json.loads(string_data(payload))
         except Exception:  # anybody may publish anything there
             continue
-        if isinstance(told, dict):
-            return told
+        if isinstance(said, dict):
+            return said
     return {}
 
 

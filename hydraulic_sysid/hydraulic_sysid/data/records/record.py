@@ -116,7 +116,7 @@ class Record:
     def window(self, start: float, end: float) -> Record:
         """Samples with ``start ≤ time < end`` in seconds, as a record whose time starts at 0 again.
 
-        ``description["window_s"]`` tells where it lay in the whole record.
+        ``description["window_s"]`` says where it lay in the whole record.
 
         :raises RecordError: fewer than two samples lie in the window.
         """

@@ -43,7 +43,7 @@ class Table(Protocol):
 class Samples:
     """Channels with their stamps, before it is known that these are even.
 
-    ``row`` tells where a sample is in the file; ``column`` names the time there.
+    ``row`` gives the place of a sample in the file; ``column`` names the time there.
     """
 
     path: Path

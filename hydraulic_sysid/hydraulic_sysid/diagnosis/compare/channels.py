@@ -41,7 +41,7 @@ def load_pressure(pressure_a: Array, pressure_b: Array, model: Model) -> Array:
 
 @dataclass(frozen=True)
 class Measured:
-    """A record's channels, those that follow from them, and their noise floors."""
+    """A record's channels, those that follow from them, and the standard deviations of their noise."""
 
     record: Record
     channels: dict[str, Array]
@@ -55,7 +55,7 @@ class Measured:
 
 
 def measured(record: Record, model: Model, to_velocity: VelocityFilter | None = None) -> Measured:
-    """Channels, derived channels and noise floors of a record that has at least ``drive`` and ``position``.
+    """Channels, derived channels and noise of a record that has at least ``drive`` and ``position``.
 
     ``to_velocity`` fixes the derivative filter; otherwise the record's own noise and motion choose it.
     """

@@ -81,7 +81,7 @@ def map_finding(channel: str, unit: str, variable: str, variable_unit: str, m: E
     )
     text = (
         f"The {TITLES[channel]} error {shape} "
-        f"({TITLES[variable]} alone explains {100 * m.explained:.0f} % of its variance on data held out)."
+        f"({TITLES[variable]} alone explains {100 * m.explained:.0f} % of its variance, cross-validated)."
     )
     numbers = {"variable": variable, "explained": m.explained, **numbers}
     return Finding(channel, "depends_on", text, m.explained, numbers)

@@ -1,4 +1,4 @@
-"""Grey box: a black-box model of what a physical model leaves, to tell how much is left to be named."""
+"""Grey box: a black-box model of what a physical model leaves, to say how much is left to be named."""
 
 from .document import GreyBoxError, grey_box
 

@@ -74,8 +74,8 @@ def subsystem_regressors(s: Signals, balances: tuple[str, ...], k: Knots, waves:
 def reversal_regressors(s: Signals, noise: float) -> Array:
     """Forces ``(T, n)`` by which laws of dry friction differ while it turns around, none for a model without any.
 
-    Within a few times what the position sensor resolves (``noise`` [m]) no motion is seen that would tell one law from
-    another, and a smoothed velocity changes its sign early or late: neither is a fault of the model.
+    Within a few times what the position sensor resolves (``noise`` [m]) no motion is seen that distinguishes the laws,
+    and a smoothed velocity changes its sign early or late: neither is a fault of the model.
     """
     model = s.plant.model
     dry = any("direction" in arguments(f) for e in model.effects for f in model.library[e].functions().values())

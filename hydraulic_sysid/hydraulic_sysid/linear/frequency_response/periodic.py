@@ -14,7 +14,7 @@ from hydraulic_sysid.excitation import ExcitationError, Plan
 from hydraulic_sysid.linear.errors import FrequencyResponseError
 
 _PART = 0.02  # of a period, over which drift from one period to the next is averaged
-_PLAYED = 0.05  # of the strongest line: what is stronger was played, where no plan tells
+_PLAYED = 0.05  # of the strongest line: what is stronger was played, where no plan says so
 
 
 @dataclass(frozen=True)

@@ -94,8 +94,8 @@ def _cross_validated(
     squares, count = 0.0, 0
     for part in range(_PARTS):
         inside = [(round(u.size * part / _PARTS), round(u.size * (part + 1) / _PARTS)) for u in us]
-        rest_u = [piece for u, (a, b) in zip(us, inside, strict=True) for piece in (u[:a], u[b:]) if piece.size]
-        rest_y = [piece for y, (a, b) in zip(ys, inside, strict=True) for piece in (y[:a], y[b:]) if piece.size]
+        rest_u = [rest for u, (a, b) in zip(us, inside, strict=True) for rest in (u[:a], u[b:]) if rest.size]
+        rest_y = [rest for y, (a, b) in zip(ys, inside, strict=True) for rest in (y[:a], y[b:]) if rest.size]
         try:
             model = structure.fit(rest_u, rest_y, dt, offsets)
         except IdentificationError:

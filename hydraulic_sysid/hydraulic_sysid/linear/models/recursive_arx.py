@@ -31,7 +31,7 @@ _UNCERTAIN = 1e6  # prior variance of every coefficient, in the units of the sca
 
 @dataclass(frozen=True)
 class Step:
-    """What one sample told: the output predicted before it was seen, and the error, in the output's unit."""
+    """What one sample showed: the output predicted before it was seen, and the error, in the output's unit."""
 
     measured: float
     predicted: float
@@ -134,7 +134,7 @@ class RecursiveArx:
         if np.trace(following) < self._forgetting * _UNCERTAIN * self._size:
             following /= self._forgetting
         self._p = 0.5 * (following + following.T)  # rounding must not make it lose its symmetry
-        # The error before the sample was learned from, scaled by what it told, is the unbiased one.
+        # The error before the sample was learned from, scaled by its weight, is the unbiased one.
         self._squares = self._forgetting * self._squares + error**2 * self._forgetting / weight
         self._weight = self._forgetting * self._weight + 1.0
         self.updates += 1

@@ -41,7 +41,7 @@ class LiveModel:
     def take(self, sample: PlantSample) -> tuple[PlantSample, PlantSample] | None:
         """Predicted values and residual (measured − predicted) at the sample *before* this one.
 
-        The model needs to know how long a drive was held before it can go on, which the next sample tells. None at
+        The model needs to know how long a drive was held before it can go on, which the next sample shows. None at
         first and after a gap. A quantity that is not measured has a NaN residual.
         """
         last, self._last = self._last, sample

@@ -27,7 +27,7 @@ def residual_tests(residual: Array, drive: Array, lags: int = LAGS) -> dict[str,
 
     ``autocorrelation`` of lags 0 … ``lags``, ``cross_correlation`` of lags −``lags`` … ``lags``, ``bound`` and
     ``cross_bound``, and of each the share of lags ``outside`` (0.01 is expected of a perfect model). Positive lags:
-    the input came first. None for too short a stretch, or if residual or input stand still.
+    the input came first. None for too few samples, or if residual or input stand still.
     """
     if residual.size < max(SHORTEST, 4 * lags) or not (np.ptp(residual) > 0.0 and np.ptp(drive) > 0.0):
         return None
