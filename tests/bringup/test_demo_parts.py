@@ -140,7 +140,7 @@ def runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[list[str]
             assert attempt == len(folders)
             return reasons[attempt - 1]
 
-        monkeypatch.setattr(online, "_excite_and_record", one)
+        monkeypatch.setattr(online, "excite_and_record", one)
         return folders
 
     return play  # type: ignore[return-value]
@@ -169,7 +169,7 @@ class Plant:
 def test_an_aborted_experiment_is_run_again_and_its_bag_kept_aside(runs: Any, tmp_path: Path) -> None:
     runs(["no state for 0.6 s", ""])
     said, plant = Said(), Plant()
-    bag = online._experiment(None, plant, online.Experiment("chirp", Path("p.yaml")), tmp_path, said, 2)  # type: ignore[arg-type]
+    bag = online.record_experiment(None, plant, online.Experiment("chirp", Path("p.yaml")), tmp_path, said, 2)  # type: ignore[arg-type]
     assert bag == tmp_path / "chirp"
     assert bag.is_dir()
     assert (tmp_path / "chirp.aborted").is_dir()
@@ -182,21 +182,21 @@ def test_an_aborted_experiment_is_run_again_and_its_bag_kept_aside(runs: Any, tm
 def test_the_last_attempt_that_is_aborted_fails_the_step(runs: Any, tmp_path: Path, attempts: int) -> None:
     folders = runs(["travel", "travel"])
     with pytest.raises(DemoError, match="'chirp: excite and record': aborted: travel"):
-        online._experiment(None, Plant(), online.Experiment("chirp", Path("p")), tmp_path, Said(), attempts)  # type: ignore[arg-type]
+        online.record_experiment(None, Plant(), online.Experiment("chirp", Path("p")), tmp_path, Said(), attempts)  # type: ignore[arg-type]
     assert len(folders) == attempts
 
 
 def test_a_fault_that_stays_takes_the_plant_through_its_whole_life(runs: Any, tmp_path: Path) -> None:
     runs(["not started: waited", ""])
     plant = Plant(fault="configure it anew")
-    online._experiment(None, plant, online.Experiment("chirp", Path("p.yaml")), tmp_path, Said(), 2)  # type: ignore[arg-type]
+    online.record_experiment(None, plant, online.Experiment("chirp", Path("p.yaml")), tmp_path, Said(), 2)  # type: ignore[arg-type]
     assert plant.asked == ["reset", "deactivate", "cleanup", "configure", "activate", "reset", "enable"]
 
 
 def test_a_plant_that_stays_at_fault_fails_the_step(runs: Any, tmp_path: Path) -> None:
     runs(["valve fault", ""])
     with pytest.raises(DemoError, match="'chirp: run it once more': the plant was not enabled again: pressure lost"):
-        online._experiment(
+        online.record_experiment(
             None,  # type: ignore[arg-type]
             Plant("pressure lost"),
             online.Experiment("chirp", Path("p.yaml")),
@@ -218,7 +218,7 @@ def test_over_can_the_demo_brings_its_own_devices_and_touches_no_real_bus(lockst
             pass
 
     crew = Started()
-    values = online._start_devices(crew, Path("m.yaml"), Said(), lockstep)  # type: ignore[arg-type]
+    values = online.start_devices(crew, Path("m.yaml"), Said(), lockstep)  # type: ignore[arg-type]
     assert values["interface"] == "udp_multicast"
     assert crew.module == "hydraulic_bringup.verbs.virtual_bench"
     options = [option for option in crew.arguments if option != "--lockstep"]

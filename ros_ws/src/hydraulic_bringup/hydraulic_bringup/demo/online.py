@@ -88,7 +88,7 @@ def run(
         client_class = import_module(_CLIENT).GraphClient
         with client_class() as client:
             simulator = _start_plant(crew, client, plant, module, model, steps, lockstep)
-            bags = [_experiment(crew, client, experiment, out, steps, ATTEMPTS) for experiment in experiments]
+            bags = [record_experiment(crew, client, experiment, out, steps, ATTEMPTS) for experiment in experiments]
             steps.begin("stop the plant", 1.0)
             simulator.stop()
             steps.done()
@@ -125,7 +125,7 @@ def _free_domain() -> Iterator[int]:
 def _start_plant(crew: Crew, client, plant: str, module: str, model: Path, steps: Steps, lockstep: bool) -> Child:
     values: dict[str, object] = {"watchdog": WATCHDOG_S, "lockstep": lockstep}
     if plant == "can":
-        values |= _start_devices(crew, model, steps, lockstep)
+        values |= start_devices(crew, model, steps, lockstep)
     else:
         values |= {"model": str(model), **SENSORS, "real_time_factor": FASTEST if lockstep else 1.0}
     steps.begin("start the plant", 3.0)
@@ -148,7 +148,7 @@ def _start_plant(crew: Crew, client, plant: str, module: str, model: Path, steps
     return child
 
 
-def _start_devices(crew: Crew, model: Path, steps: Steps, lockstep: bool) -> dict[str, object]:
+def start_devices(crew: Crew, model: Path, steps: Steps, lockstep: bool) -> dict[str, object]:
     """Start virtual CAN devices over the model, on a channel of their own; what the driver has to be told of them."""
     step = "start the virtual CAN devices"
     steps.begin(step, 3.0)
@@ -163,13 +163,13 @@ def _start_devices(crew: Crew, model: Path, steps: Steps, lockstep: bool) -> dic
     return {"bus": str(BUS), "interface": line[1], "channel": channel}
 
 
-def _experiment(crew: Crew, client, experiment: Experiment, out: Path, steps: Steps, attempts: int) -> Path:
+def record_experiment(crew: Crew, client, experiment: Experiment, out: Path, steps: Steps, attempts: int) -> Path:
     """Its bag; an experiment that does not start or is aborted is run again while attempts are left."""
     bag = (out / experiment.name).absolute()
     for attempt in range(1, attempts + 1):
         if attempt > 1:
             _release(client, experiment, steps)
-        reason = _excite_and_record(crew, client, experiment, bag, steps, attempt)
+        reason = excite_and_record(crew, client, experiment, bag, steps, attempt)
         if not reason:
             return bag
         if attempt < attempts:
@@ -194,7 +194,7 @@ def _release(client, experiment: Experiment, steps: Steps) -> None:
         raise DemoError(f"{experiment.name}: run it once more", f"the plant was not enabled again: {problem}")
 
 
-def _excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, steps: Steps, attempt: int) -> str:
+def excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, steps: Steps, attempt: int) -> str:
     """Record one run into ``bag``; empty, or why the excitation aborted or did not start it.
 
     :raises DemoError: a process failed, or none answered.
