@@ -26,7 +26,7 @@ SOURCES = ("hydraulic_sim/hydraulic_sim", "hydraulic_sysid/hydraulic_sysid")
 
 
 def version() -> str:
-    """A digest of what is judged, so that results of different states are told apart."""
+    """A digest of what is judged, so that results of different states are distinguished."""
     digest = hashlib.sha256()
     for folder in SOURCES:
         for path in sorted((ROOT / folder).rglob("*.py")):
@@ -169,7 +169,7 @@ def rate_rows(found: list[dict[str, Any]]) -> list[str]:
 def answered(marks: dict[str, Any]) -> str:
     """What a diagnosis said, in few words."""
     if marks["verdict"] == scoring.TIE:
-        return "not told apart: " + ", ".join(marks["named"] or marks["shortlist"])
+        return "indistinguishable: " + ", ".join(marks["named"] or marks["shortlist"])
     return " + ".join(marks["named"]) or marks["verdict"]
 
 

@@ -24,5 +24,5 @@ EFFECT = Effect(
     source="Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30(7)",
     excited_by="slow motion at several mean pressures",
     confused_with=("coulomb_friction",),
-    told_apart_by="friction force over p_A + p_B",
+    distinguished_by="friction force over p_A + p_B",
 )

@@ -100,7 +100,7 @@ class Effect:
     source: str
     excited_by: str
     confused_with: tuple[str, ...]
-    told_apart_by: str
+    distinguished_by: str
     states: tuple[State, ...] = ()
     dynamics: Callable | None = None
     memory: int = 0
@@ -121,7 +121,7 @@ class Effect:
             raise EffectError(f"effect {self.name or '?'}: states and a dynamics kernel go together")
         if not self.always_on and all(p.null is None for p in self.parameters):
             raise EffectError(f"effect {self.name or '?'}: no parameter has a null value")
-        for text in ("summary", "equation", "source", "excited_by", "told_apart_by"):
+        for text in ("summary", "equation", "source", "excited_by", "distinguished_by"):
             if not getattr(self, text).strip():
                 raise EffectError(f"effect {self.name or '?'}: {text} is empty")
 

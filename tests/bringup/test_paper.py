@@ -28,7 +28,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any],
     return out, json.loads((out / "paper.json").read_text(encoding="utf-8")), said.getvalue()
 
 
-def test_the_best_fits_of_the_paper_are_reached_on_held_out_data(run: Any) -> None:
+def test_the_best_fits_of_the_paper_are_reached_on_test_data(run: Any) -> None:
     rows = {r["excitation"]: r for r in run[1]["models"]}
     assert rows["multisine"]["best_fit"] >= printed.BEST_FIT["multisine"] == 99.17
     assert rows["chirp"]["best_fit"] >= printed.BEST_FIT["chirp"] == 98.79

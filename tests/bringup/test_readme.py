@@ -196,8 +196,10 @@ def test_paths_in_the_text_are_there(page: Path) -> None:
         assert any(place.exists() for place in places), word
 
 
-def test_the_picture_is_small() -> None:
-    assert (ROOT / "docs/images/report.png").stat().st_size < 400_000
+def test_the_pictures_are_small_and_each_is_shown() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    for picture in (ROOT / "docs/images").iterdir():
+        assert picture.stat().st_size < 400_000 and picture.name in text
 
 
 def test_every_package_and_executable_stands_in_the_table() -> None:

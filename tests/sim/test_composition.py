@@ -23,7 +23,7 @@ from hydraulic_sim.effect import Effect, Parameter, State
 EFFECT = Effect(
     slot={slot!r}, summary="a test", kernel=kernel, {more}
     parameters=(Parameter("size", {unit!r}, 1.0, (0.0, 2.0), "size", "made up", null=0.0),),
-    equation="F = s", source="made up, 2001", excited_by="steps", confused_with=("constant_load",), told_apart_by="-",
+    equation="F = s", source="made up", excited_by="steps", confused_with=("constant_load",), distinguished_by="-",
 )
 """
 
@@ -159,7 +159,7 @@ def test_a_parameter_that_makes_no_sense_is_refused(changes: dict[str, object], 
 def test_an_effect_that_contradicts_itself_is_refused() -> None:
     given = {
         "slot": "force", "summary": "s", "kernel": lambda size: size, "parameters": (parameter(null=0.0),),
-        "equation": "e", "source": "s", "excited_by": "e", "confused_with": (), "told_apart_by": "t",
+        "equation": "e", "source": "s", "excited_by": "e", "confused_with": (), "distinguished_by": "t",
     }  # fmt: skip
     Effect(**given)  # type: ignore[arg-type]
     for changes, says in (

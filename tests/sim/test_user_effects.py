@@ -36,7 +36,7 @@ EFFECT = Effect(
         Parameter("shape", "1", 1.0, (0.0, 2.0), "not used", "made up, 2001", free=False),
     ),
     equation="q = c*PL", source="made up, 2001", excited_by="holding under load",
-    confused_with=("internal_leakage",), told_apart_by="-",
+    confused_with=("internal_leakage",), distinguished_by="-",
 )
 """
 

@@ -145,7 +145,7 @@ def test_residual_falls_to_the_noise_on_held_out_records_too(records: list[Recor
     assert done.model.entry("moving_mass").standard_error == named(done.result, "moving_mass")["standard_error"]
 
 
-def test_held_out_records_do_not_touch_the_fit(
+def test_records_for_testing_do_not_touch_the_fit(
     records: list[Record], axis: list[dict[str, Array]], model: Model
 ) -> None:
     other = noisy("other", {**axis[2], "position": axis[2]["position"] * 1.3}, 5)

@@ -1,4 +1,4 @@
-"""The grey box: what is left is told apart into noise, what physics does not name, and what nothing tells."""
+"""The grey box: what is left is separated into noise, what physics does not name, and what nothing tells."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_the_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.Captur
 
 
 def test_what_cannot_be_says_why(model: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(GreyBoxError, match="held out"):
+    with pytest.raises(GreyBoxError, match="test on"):
         grey_box(model, [measured(model, 1)], [])
     short = measured(model, 1).window(0.0, 3.0)
     with pytest.raises(GreyBoxError, match="too short"):

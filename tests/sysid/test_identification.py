@@ -28,7 +28,7 @@ def plant(n: int, seed: int, noise: float) -> Record:
     return record_of(lfilter([0.0, 0.05, 0.04], den, u) + lfilter([1.0], den, e), u, f"made{seed}")
 
 
-def test_final_prediction_error_foresees_the_held_out_error() -> None:
+def test_final_prediction_error_foresees_the_error_on_test_data() -> None:
     settings = IdentificationSettings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT, holdout=0.5)
     result = identify([plant(8000, 1, 0.02)], settings=settings)
     assert result["test"]["mse_one_step"] == pytest.approx(result["test"]["fpe"], rel=0.1)
@@ -44,7 +44,7 @@ def test_too_low_an_order_fails_the_residual_tests() -> None:
     assert np.mean(np.abs(tests["autocorrelation"][1:]) > tests["bound"]) > 0.3
 
 
-def test_held_out_part_has_no_say_in_the_fit() -> None:
+def test_the_test_part_has_no_say_in_the_fit() -> None:
     first = plant(1000, 3, 0.02)
     spoilt = np.concatenate((first["position"][:800], np.random.default_rng(0).standard_normal(200)))
     settings = IdentificationSettings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT)

@@ -135,7 +135,7 @@ def bench() -> Plant:
 
 
 @pytest.mark.parametrize("dt_model", [0.001, 0.05])
-def test_the_nonlinear_plant_is_fitted_on_held_out_data(bench: Plant, dt_model: float) -> None:
+def test_the_nonlinear_plant_is_fitted_on_test_data(bench: Plant, dt_model: float) -> None:
     from hydraulic_sysid.data.resampling import held_average, sampled
 
     u = three_tones(50_000, 1e-3, 1.5, 2.0)

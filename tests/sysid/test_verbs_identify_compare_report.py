@@ -57,7 +57,7 @@ def test_identify_holds_whole_records_out(tmp_path: Path, capsys: pytest.Capture
     assert result["settings"]["sampling_time"] == 0.02
     printed = capsys.readouterr().out
     assert "ARX(2, 2, 1) at 20 ms" in printed
-    assert "held out" in printed
+    assert "test data" in printed
 
 
 def test_report_makes_one_page_of_all_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

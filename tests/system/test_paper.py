@@ -54,6 +54,6 @@ def test_a_short_record_of_the_band_still_gives_good_models(run: Any) -> None:
 
 def test_page_and_tables_are_there(run: Any) -> None:
     assert "Open the report" in run[2]
-    assert "best fit, held out" in run[2]
+    assert "best fit, test data" in run[2]
     page = (run[0] / "report.html").read_text(encoding="utf-8")
     assert "<script src" not in page

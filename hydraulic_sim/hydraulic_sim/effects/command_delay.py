@@ -26,7 +26,7 @@ EFFECT = Effect(
     excited_by="steps and chirp: the pressures react late too",
     confused_with=("spool_dynamics", "sensor_delay", "sensor_lag"),
     alike_without_pressures="lag",
-    told_apart_by="the pressures react late too; phase grows with frequency, amplitude does not fall",
+    distinguished_by="the pressures react late too; phase grows with frequency, amplitude does not fall",
     order=10,
     reach=lambda p: p["delay"],
 )

@@ -31,7 +31,7 @@ EFFECT = Effect(
     excited_by="chirp and steps",
     confused_with=("command_delay", "sensor_lag", "spool_dynamics"),
     alike_without_pressures="lag",
-    told_apart_by="the pressures lead the position, over frequency",
+    distinguished_by="the pressures lead the position, over frequency",
     order=10,
     reach=lambda p: p["delay"],
 )

@@ -38,6 +38,6 @@ EFFECT = Effect(
     excited_by="chirp and steps",
     confused_with=("spool_dynamics", "sensor_delay", "command_delay"),
     alike_without_pressures="lag",
-    told_apart_by="the pressures lead the position",
+    distinguished_by="the pressures lead the position",
     order=5,
 )

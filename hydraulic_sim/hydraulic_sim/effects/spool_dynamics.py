@@ -31,15 +31,8 @@ EFFECT = Effect(
     dynamics=dynamics,
     states=(State("lift", "1", initial="command"), State("lift_rate", "1/s", scale=100.0)),
     parameters=(
-        Parameter(
-            "frequency",
-            "Hz",
-            80.0,
-            (5.0, IDEAL),
-            "natural frequency f",
-            "two-stage servo valves of this class: 30 to 150 Hz",
-            null=IDEAL,
-        ),
+        Parameter("frequency", "Hz", 80.0, (5.0, IDEAL), "natural frequency f",
+                  "two-stage servo valves of this class: 30 to 150 Hz", null=IDEAL),
         Parameter("damping", "1", 0.7, (0.2, 2.0), "damping ratio", "two-stage servo valves: 0.5 to 0.9"),
     ),
     equation="d2s/dt2 = w^2*(s_d - s) - 2*zeta*w*ds/dt",
@@ -47,6 +40,6 @@ EFFECT = Effect(
     excited_by="chirp or steps up to the valve's bandwidth",
     confused_with=("command_delay", "sensor_lag"),
     alike_without_pressures="lag",
-    told_apart_by="phase over frequency at two amplitudes",
+    distinguished_by="phase over frequency at two amplitudes",
     step_rate=lambda p: 2.0 * math.pi * p["frequency"] if p["frequency"] < IDEAL else 0.0,
 )

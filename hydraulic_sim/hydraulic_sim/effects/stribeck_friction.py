@@ -21,15 +21,8 @@ EFFECT = Effect(
     summary="dry friction that rises towards standstill",
     kernel=force,
     parameters=(
-        Parameter(
-            "rise",
-            "N",
-            200.0,
-            (0.0, 1e5),
-            "break-away friction above sliding friction, Fs - Fc",
-            "Jelali & Kroll (2003): Fs is 1.2 to 2 times Fc",
-            null=0.0,
-        ),
+        Parameter("rise", "N", 200.0, (0.0, 1e5), "break-away friction above sliding friction, Fs - Fc",
+                  "Jelali & Kroll (2003): Fs is 1.2 to 2 times Fc", null=0.0),
         Parameter("speed", "m/s", 0.01, (1e-4, 0.2), "Stribeck speed v_s", "hydraulic seals: 1 to 20 mm/s"),
     ),
     equation="F = -(Fs - Fc)*exp(-(v/vs)^2)*sign(v)",
@@ -37,6 +30,6 @@ EFFECT = Effect(
     excited_by="the lowest speeds, through standstill",
     confused_with=("coulomb_friction", "presliding"),
     alike_without_pressures="sticking",
-    told_apart_by="the lowest speeds: friction falls as the speed rises",
+    distinguished_by="the lowest speeds: friction falls as the speed rises",
     step_rate=lambda p: max(dry_friction_rate(p["rise"], p), 0.86 * p["rise"] / (p["speed"] * p["moving_mass"])),
 )

@@ -23,22 +23,15 @@ EFFECT = Effect(
     dynamics=dynamics,
     states=(State("line_pressure", "Pa", initial="supply_pressure", kind="relaxation", scale=1e6),),
     parameters=(
-        Parameter(
-            "resistance",
-            "Pa*s/m^3",
-            1e9,
-            (0.0, 1e12),
-            "drop of the supply per flow drawn, R",
-            "1 MPa at 60 l/min",
-            null=0.0,
-        ),
+        Parameter("resistance", "Pa*s/m^3", 1e9, (0.0, 1e12), "drop of the supply per flow drawn, R",
+                  "1 MPa at 60 l/min", null=0.0),
         Parameter("time", "s", 0.1, (1e-3, 100.0), "time constant tau", "small accumulator: 0.05 to 1 s"),
     ),
     equation="dps/dt = (Ps - R*q - ps)/tau",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",
     excited_by="slow against fast large strokes",
     confused_with=("valve_flow_saturation", "return_back_pressure"),
-    told_apart_by="slow against fast large strokes",
+    distinguished_by="slow against fast large strokes",
     # the flow drawn falls with the supply pressure, most at a small drop over the lands
     step_rate=lambda p: (
         p["resistance"] * p["valve_flow"] / (p["valve_drop"] * p["orifice_transition"]) ** 0.5 / p["time"]

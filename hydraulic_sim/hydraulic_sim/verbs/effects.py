@@ -61,7 +61,7 @@ def _whole(record: dict) -> None:
         ("equation", "equation"),
         ("source", "source"),
         ("excited by", "excited_by"),
-        ("distinguished by", "told_apart_by"),
+        ("distinguished by", "distinguished_by"),
         ("file", "file"),
     ):
         console.print(f"  {label}: {record[key]}", markup=False)

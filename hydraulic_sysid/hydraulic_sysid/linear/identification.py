@@ -30,7 +30,7 @@ class IdentificationSettings:
     sampling_time: float = 0.05
     """Seconds; the records are brought to it (see `resampling`)."""
     holdout: float = 0.2
-    """Last part of every record that is kept from the fit, unless records are held out as a whole."""
+    """Last part of every record that is kept from the fit, unless whole records are for testing."""
     offsets: str = "estimate"
     select: str | None = None
     """Choose the order, up to that of ``structure``, by one of `linear_models.CRITERIA`."""
@@ -48,32 +48,36 @@ class _Series:
 
 
 def identify(
-    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: IdentificationSettings | None = None
+    records: Sequence[Record],
+    test_records: Sequence[Record] | None = None,
+    settings: IdentificationSettings | None = None,
 ) -> dict[str, Any]:
-    """Result document of a linear model fitted to ``records`` and tried on ``held_out``.
+    """Result document of a linear model fitted to ``records`` and tried on ``test_records``.
 
-    Without ``held_out`` the last part of every record is kept from the fit and tried on.
+    Without ``test_records`` the last part of every record is kept from the fit and tried on.
 
     :raises IdentificationError: no record, a channel missing, too little or too poor data, an impossible
     sampling time or criterion.
     """
-    return identify_model(records, held_out, settings)[0]
+    return identify_model(records, test_records, settings)[0]
 
 
 def identify_model(
-    records: Sequence[Record], held_out: Sequence[Record] | None = None, settings: IdentificationSettings | None = None
+    records: Sequence[Record],
+    test_records: Sequence[Record] | None = None,
+    settings: IdentificationSettings | None = None,
 ) -> tuple[dict[str, Any], LinearModel]:
     """As `identify`; the model too."""
     settings = settings or IdentificationSettings()
     if not records:
         raise IdentificationError("there is no record to identify from")
-    if held_out is None:
+    if test_records is None:
         if not 0.0 < settings.holdout < 1.0:
             raise IdentificationError(f"holdout is {settings.holdout:g}: a part between 0 and 1 is allowed")
         parts = [record.split(1.0 - settings.holdout) for record in records]
-        records, held_out = [first for first, _ in parts], [last for _, last in parts]
+        records, test_records = [first for first, _ in parts], [last for _, last in parts]
     fit_on = [_series(record, settings) for record in records]
-    try_on = [_series(record, settings) for record in held_out]
+    try_on = [_series(record, settings) for record in test_records]
     data = [s.u for s in fit_on], [s.y for s in fit_on], settings.sampling_time, settings.offsets
     structure, tried = settings.structure, None
     if settings.select is not None:

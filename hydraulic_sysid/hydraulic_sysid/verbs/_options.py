@@ -131,7 +131,7 @@ def read_records(options: argparse.Namespace) -> list[Record]:
     return [r.window(*window) for r in records] if window else records
 
 
-def read_held_out(paths: list[Path] | None, options: argparse.Namespace) -> list[Record]:
+def read_kept_back(paths: list[Path] | None, options: argparse.Namespace) -> list[Record]:
     """Records that an option of their own names; none where it does not."""
     return read_all(paths, options.columns) if paths else []
 
@@ -159,7 +159,7 @@ def add_period_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_diagnosis_options(parser: argparse.ArgumentParser) -> None:
-    """Model, records, held-out records, length of a segment."""
+    """Model, records, records for validation, length of a segment."""
     add_model_option(parser)
     add_record_options(parser)
     parser.add_argument(
@@ -167,14 +167,16 @@ def add_diagnosis_options(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         type=Path,
         nargs="+",
-        help="records that no fit sees (default: every third stretch of every record)",
+        help="records for validation (default: every third block of every record)",
     )
-    add_piece_option(parser)
+    add_segment_option(parser)
 
 
-def add_piece_option(parser: argparse.ArgumentParser) -> None:
-    """``--piece SECONDS``: how long the segments are whose initial states are fitted along."""
-    parser.add_argument("--piece", metavar="SECONDS", type=float, default=0.5, help="length of a piece (default 0.5)")
+def add_segment_option(parser: argparse.ArgumentParser) -> None:
+    """``--segment SECONDS``: how long the segments are whose initial states are fitted too."""
+    parser.add_argument(
+        "--segment", "--piece", metavar="SECONDS", type=float, default=0.5, help="length of a segment (default 0.5)"
+    )
 
 
 LIMITS = {

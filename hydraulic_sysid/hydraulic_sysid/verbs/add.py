@@ -1,4 +1,4 @@
-"""Add one effect to a model: fit it to records and see what it does to the error on data held out.
+"""Add one effect to a model: fit it to records and see what it does to the error on validation data.
 
 Writes add.json, a page (report.html) and the new model (model.yaml), whose history says what it was learned from.
 """
@@ -18,7 +18,7 @@ EPILOG = """\
 example:
   python -m hydraulic_sysid add valve_deadband --model sample_bench --record examples/sample_bench --out runs/added
 
-exit codes: 0 held-out data bear the effect out; 1 they do not (the model is written all the same); 2 unusable input
+exit codes: 0 validation data bear the effect out; 1 they do not (the model is written all the same); 2 unusable input
 """
 
 
@@ -34,6 +34,6 @@ def _add(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     opt.check_new(options.out, opt.MODEL)
     model = load_model(options.model)
     records = opt.read_records(options)
-    held_out = opt.read_held_out(options.holdout, options)
-    done = add(model, options.effect, records, held_out, FitSettings(length=options.piece), say)
+    validation = opt.read_kept_back(options.holdout, options)
+    done = add(model, options.effect, records, validation, FitSettings(length=options.segment), say)
     return opt.Done(done.result, {opt.MODEL: partial(save_model, done.model)}, done.confirmed)

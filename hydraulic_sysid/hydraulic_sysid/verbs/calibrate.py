@@ -1,6 +1,6 @@
 """Fit a model's free parameters to records, and say how well these determine them.
 
-Every record is cut into short pieces whose initial states are fitted along, so that the drift of an integrating
+Every record is cut into short segments whose initial states are fitted too, so that the drift of an integrating
 plant does not hide the rest. Writes calibrate.json, a page (report.html) and the calibrated model (model.yaml).
 """
 
@@ -35,7 +35,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--free", metavar="KEY", nargs="+", help="parameters to fit (default: those the model calls free)"
     )
-    opt.add_piece_option(parser)
+    opt.add_segment_option(parser)
     parser.add_argument("--robust", action="store_true", help="let outliers count less (soft L1)")
     return opt.run(parser, _calibrate, _show, argv)
 
@@ -44,9 +44,9 @@ def _calibrate(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     opt.check_new(options.out, opt.MODEL)
     model = load_model(options.model)
     records = opt.read_records(options)
-    held_out = opt.read_held_out(options.holdout_record, options)
-    settings = FitSettings(length=options.piece, robust=options.robust)
-    done = calibrate(model, records, held_out, settings, options.free, lambda text: say(f"calibrating: {text}"))
+    test_records = opt.read_kept_back(options.holdout_record, options)
+    settings = FitSettings(length=options.segment, robust=options.robust)
+    done = calibrate(model, records, test_records, settings, options.free, lambda text: say(f"calibrating: {text}"))
     return opt.Done(done.result, {opt.MODEL: partial(save_model, done.model)}, done.result["converged"])
 
 

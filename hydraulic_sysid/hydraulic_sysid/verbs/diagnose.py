@@ -3,7 +3,7 @@
 Fits what the model calls free, tries every effect of the library that is off, and says what is missing, what these
 data cannot tell apart, that nothing is missing, or what shape it has that no effect explains. What counts must lower
 the error on data that no fit has seen. Writes diagnose.json and a page (report.html); with --apply also model.yaml,
-the model with what was found; for a verdict with several names each rival's model (competing_EFFECT.yaml).
+the model with what was found; for a verdict with several names each competing model (competing_EFFECT.yaml).
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     opt.check_new(options.out, *((opt.MODEL,) if options.apply else ()), "competing_*.yaml")
     model = load_model(options.model)
     records = opt.read_records(options)
-    held_out = opt.read_held_out(options.holdout, options)
-    done = diagnose(model, records, held_out, FitSettings(length=options.piece), say)
+    validation = opt.read_kept_back(options.holdout, options)
+    done = diagnose(model, records, validation, FitSettings(length=options.segment), say)
     verdict = done.result["verdict"]
     models = {opt.MODEL: done.model} if options.apply else {}
     models |= {f"competing_{name}.yaml": other for name, other in done.alternatives.items()}

@@ -1,7 +1,7 @@
 """Put a black box on top of a physical model, and say how much is left that the physics does not name.
 
 The model's error a horizon ahead is fitted by linear and nonlinear functions of the drive and of what the model
-predicts, chosen by cross-validation, and these are tried on data held out. Writes the shares of noise, of what the
+predicts, chosen by cross-validation, and these are tried on test data. Writes the shares of noise, of what the
 black box explains and of what nothing explains (greybox.json) and a page to look at (report.html) into a folder.
 """
 
@@ -38,17 +38,17 @@ def main(argv: list[str] | None = None) -> int:
 def _grey_box(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     model = load_model(options.model)
     records = opt.read_records(options)
-    held_out = opt.read_held_out(options.holdout_record, options)
-    if not held_out:
+    test_records = opt.read_kept_back(options.holdout_record, options)
+    if not test_records:
         if not 0.0 < options.holdout < 1.0:
             raise cli.UsageError(f"--holdout is {options.holdout:g}: a part between 0 and 1 is allowed")
         parts = [record.split(1.0 - options.holdout) for record in records]
-        records, held_out = [first for first, _ in parts], [last for _, last in parts]
-    return opt.Done(grey_box(model, records, held_out, options.horizon, lambda name: say(f"comparing {name}")))
+        records, test_records = [first for first, _ in parts], [last for _, last in parts]
+    return opt.Done(grey_box(model, records, test_records, options.horizon, lambda name: say(f"comparing {name}")))
 
 
 def _show(result: dict[str, Any], console: Console) -> None:
-    title = f"What {result['model']['name']} leaves {result['settings']['horizon']:g} s ahead, held-out data"
+    title = f"What {result['model']['name']} leaves {result['settings']['horizon']:g} s ahead, test data"
     columns = ("channel", ">white box", ">+ linear", ">+ nonlinear", ">exact model", ">not named", ">neither")
     table = tables.table(title, columns)
     for channel in result["channels"].values():

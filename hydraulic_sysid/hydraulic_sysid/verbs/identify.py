@@ -1,4 +1,4 @@
-"""Identify a linear model from records and try it on held-out data.
+"""Identify a linear model from records and try it on test data.
 
 ARX by least squares or instrumental variables, a continuous-time transfer function by output error, or state space by
 a subspace method, of a given order or of one that a criterion chooses; best fit in free run and one step ahead, mean
@@ -82,8 +82,8 @@ def _identify(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     check_place(options.out / MODEL_FILE)
     structure = _structure(options)
     records = opt.read_records(options)
-    held_out = opt.read_held_out(options.holdout_record, options) or None
-    own = max(r.dt for r in [*records, *(held_out or [])])
+    test_records = opt.read_kept_back(options.holdout_record, options) or None
+    own = max(r.dt for r in [*records, *(test_records or [])])
     settings = identification.IdentificationSettings(
         structure=structure,
         sampling_time=options.sampling_time or (own if options.model == "tf" else max(0.05, own)),
@@ -93,7 +93,7 @@ def _identify(options: argparse.Namespace, say: opt.Say) -> opt.Done:
         input=options.input,
         output=options.output,
     )
-    result, model = identification.identify_model(records, held_out, settings)
+    result, model = identification.identify_model(records, test_records, settings)
     write = partial(write_linear_model, model=model, **identification.about(result))
     return opt.Done(result, {MODEL_FILE: write})
 
@@ -111,7 +111,7 @@ def _show(result: dict[str, Any], console: Console) -> None:
     factor, unit = shown(own)
     columns = ("|record", "|data", ">samples", ">free run", ">one step", f">MSE, one step, {unit}²")
     table = tables.table("Best fit in free run and one step ahead", columns)
-    for part, word in (("test", "held out"), ("fit", "fitted")):
+    for part, word in (("test", "test data"), ("fit", "fitted")):
         for r in result[part]["records"]:
             table.add_row(
                 r["name"], word, str(r["samples"]), _fit(r["best_fit_free_run"]), _fit(r["best_fit_one_step"]),

@@ -49,7 +49,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seconds", metavar="SECONDS", type=float, default=20.0, help="of the drive (default 20)")
     parser.add_argument("--rate", metavar="HZ", type=float, default=1000.0, help="samples per second (default 1000)")
     parser.add_argument("--centre", metavar="M", type=float, default=0.0, help="around which the piston moves")
-    parser.add_argument("--piece", metavar="SECONDS", type=float, help="length of a piece (default: the diagnosis's)")
+    parser.add_argument("--segment", "--piece", metavar="S", type=float, help="of segments (default: the diagnosis's)")
     opt.add_limit_options(parser, "models")
     return opt.run(parser, _design, _show, argv, bulky=("traces", "differences"))
 
@@ -63,7 +63,7 @@ def _design(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     models = competing.of_diagnosis(file.parent, diagnosis) if diagnosis else competing.of_files(options.model)
     noise = _noise(options, diagnosis)
     limits = replace(limits_of(models, options.centre), **opt.given_limits(options))
-    length = options.piece or float(diagnosis.get("settings", {}).get("segment_length", 0.5))
+    length = options.segment or float(diagnosis.get("settings", {}).get("segment_length", 0.5))
     proposal = next_experiment(
         models, limits, noise, options.seconds, lambda text: say(f"designing: {text}"),
         centre=options.centre, rate=options.rate, segment_length=length,

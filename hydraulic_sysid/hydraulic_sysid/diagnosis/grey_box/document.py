@@ -41,7 +41,7 @@ _SIGNALS = ("velocity", "position", "load_pressure")
 
 
 class GreyBoxError(HydraulicError, ValueError):
-    """Records, or the way they are held out, do not allow a black box on top of the white one."""
+    """Records, or how they are divided, do not allow a black box on top of the white one."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def grey_box(
     :raises ComparisonError: a record that lacks what a comparison needs.
     """
     if not records or not test:
-        raise GreyBoxError("a grey box needs records to fit and records (or a part of them) held out")
+        raise GreyBoxError("a grey box needs records to fit and records (or a part of them) to test on")
     plant = Plant(model)
     data: list[_Data] = []
     for record in [*records, *test]:

@@ -31,6 +31,6 @@ def effect(slot: str, kernel: Callable, unit: str, size: float, most: float, ord
         source="de Boor (1978), A Practical Guide to Splines, ch. III",
         excited_by="whatever moves the variable",
         confused_with=(),
-        told_apart_by="the variable over which the curve explains most",
+        distinguished_by="the variable over which the curve explains most",
         order=order,
     )

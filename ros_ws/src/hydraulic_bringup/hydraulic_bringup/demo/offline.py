@@ -66,8 +66,8 @@ def read_bag(bag: Path, steps: Steps, most: float) -> list[Record]:
     return even
 
 
-def analyse(records: list[Record], held_out: list[Record], model: Model, out: Path, steps: Steps) -> Analysis:
-    """Identify on ``records`` (validated on ``held_out``, or on the last fifth); compare the model with all of them.
+def analyse(records: list[Record], test_records: list[Record], model: Model, out: Path, steps: Steps) -> Analysis:
+    """Identify on ``records`` (tested on ``test_records`` or the last fifth); compare the model with all of them.
 
     Then say what the model lacks, and write the model that has it.
 
@@ -79,12 +79,12 @@ def analyse(records: list[Record], held_out: list[Record], model: Model, out: Pa
         # A record sampled more slowly than usual is identified at its own sampling time.
         sampling = max(identification.IdentificationSettings().sampling_time, *(r.dt for r in records))
         settings = identification.IdentificationSettings(sampling_time=sampling)
-        identified = identification.identify(records, held_out or None, settings)
+        identified = identification.identify(records, test_records or None, settings)
         results.write_result(out, identified)
     except IdentificationError as error:
         left_out = f"not identified: {error}"
     steps.done()
-    every = [*records, *held_out]
+    every = [*records, *test_records]
     steps.begin("compare", 3.0 + 2.0 * len(every))
     try:
         compared = compare(model, every, progress=lambda _: steps.tick())

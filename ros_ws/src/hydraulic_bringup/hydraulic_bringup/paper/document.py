@@ -47,11 +47,11 @@ def models_table(found: Sequence[study.Identified]) -> list[dict[str, Any]]:
 
 
 def thesis_table(found: Sequence[study.Identified], cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Each model on the held-out data of the paper's band (of its own kind of excitation), and over the grid.
+    """Each model on the test data of the paper's band (of its own kind of excitation), and over the grid.
 
     ``rmse`` [m] is the root mean square over all cells; null where the model is unstable.
     """
-    own = {one.excitation.kind: one.held_out for one in found if one.excitation.band == "in"}
+    own = {one.excitation.kind: one.test_record for one in found if one.excitation.band == "in"}
     rows = []
     for one in found:
         name, kind = one.excitation.name, one.excitation.kind
@@ -172,7 +172,7 @@ def _excitation(one: study.Identified, record: Record, origins: Mapping[str, str
         "prediction": plan.prediction.as_mapping(),
         "duration": whole.duration,
         "poles": one.document["model"]["poles"],
-        "test_from": whole.duration - one.held_out.duration,
+        "test_from": whole.duration - one.test_record.duration,
         "traces": {
             "drive": trace(whole.time, whole["drive"]),
             "position": trace(whole.time, whole["position"]),
@@ -193,4 +193,4 @@ def _verdict(table: Sequence[Mapping[str, Any]], thesis: Mapping[str, Mapping[st
         else "The thesis is not borne out by every measure: see below."
     )
     level = "explained" if reached and borne_out else "close" if reached or borne_out else "off"
-    return {"level": level, "text": f"Best fit on held-out data {fits}. {said}"}
+    return {"level": level, "text": f"Best fit on test data {fits}. {said}"}

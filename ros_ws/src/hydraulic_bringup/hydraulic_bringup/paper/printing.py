@@ -21,7 +21,7 @@ def show(result: dict[str, Any], console: Console) -> None:
 
 
 def _models(result: dict[str, Any], console: Console) -> None:
-    columns = ("excitation", "model", ">best fit, held out", ">MSE, mm²", ">FPE, mm²")
+    columns = ("excitation", "model", ">best fit, test data", ">MSE, mm²", ">FPE, mm²")
     table = tables.table("models (the paper's figures in brackets)", columns)
     for r in result["models"]:
         table.add_row(

@@ -60,7 +60,7 @@ class Identified:
     excitation: Excitation
     document: dict[str, Any]
     model: LinearModel
-    held_out: Record
+    test_record: Record
 
 
 def excitations(

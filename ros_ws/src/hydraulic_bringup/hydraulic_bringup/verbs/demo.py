@@ -128,8 +128,8 @@ def _run(options: argparse.Namespace, console: Console) -> None:
         with ProgressSteps(console, 70.0 if kind == "full" else 35.0) as steps:
             bags = online.run(options.plant, as_built, experiments, out, steps, options.lockstep)
             most = 0.0 if options.lockstep else offline.MOST_MISSING[options.plant]
-            records, held_out = (offline.read_bag(bag, steps, most) for bag in bags)
-            analysis = offline.analyse(records, held_out, model, out, steps)
+            records, test_records = (offline.read_bag(bag, steps, most) for bag in bags)
+            analysis = offline.analyse(records, test_records, model, out, steps)
     _print(analysis, console)
     console.print(f"\n{time.monotonic() - begun:.0f} s. Open the report: [bold]{analysis.page}[/bold]", soft_wrap=True)
 
