@@ -23,6 +23,8 @@ from types import ModuleType
 import numba
 from numba.core.errors import NumbaError
 
+from hydraulic_node_utils.whole_file import write_text
+
 from . import kernels
 from .compose import Layout, write_module
 from .errors import EffectError
@@ -121,7 +123,7 @@ def _complaint(library: Library, error: Exception) -> str:
 
 def _execute(file: Path, text: str, library: Library) -> ModuleType:
     if not file.is_file() or file.read_bytes() != text.encode():  # a power cut can leave an empty file
-        _write_once(file, text)
+        write_text(file, text)  # whole: two processes may compile the same physics at the same time
     spec = importlib.util.spec_from_file_location(file.stem, file)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -133,15 +135,6 @@ def _execute(file: Path, text: str, library: Library) -> ModuleType:
     sys.modules[spec.name] = module  # numba finds cached code again by the module's name
     spec.loader.exec_module(module)
     return module
-
-
-def _write_once(file: Path, text: str) -> None:
-    """Write atomically: two processes may compile the same physics at the same time."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=file.parent, suffix=".tmp")
-    with os.fdopen(handle, "w", encoding="utf-8") as stream:
-        stream.write(text)
-    os.replace(temporary, file)
 
 
 _COMPILED: dict[str, CompiledPlant] = {}

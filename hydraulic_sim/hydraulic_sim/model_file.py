@@ -16,8 +16,6 @@ history: []
 from __future__ import annotations
 
 import io
-import os
-import tempfile
 from importlib import resources
 from pathlib import Path
 
@@ -25,6 +23,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.representer import RepresenterError
+
+from hydraulic_node_utils.whole_file import write_text
 
 from .effect import Parameter, check_value
 from .errors import EffectError, ModelError
@@ -85,18 +85,10 @@ def save_model(model: Model, path: str | Path, overwrite: bool = False) -> Path:
         _yaml().dump(document(model, target), stream)
     except RepresenterError as error:
         raise ModelError(f"{target}: {error}") from None
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(stream.getvalue())
-        os.chmod(temporary, 0o644)
-        if not overwrite:
-            target.touch(exist_ok=False)  # fails where another process was faster
-        os.replace(temporary, target)
+        write_text(target, stream.getvalue(), overwrite=overwrite)
     except FileExistsError:
         raise ModelError(f"{target} exists; give another name (nothing is overwritten silently)") from None
-    finally:
-        Path(temporary).unlink(missing_ok=True)
     return target
 
 

@@ -160,7 +160,7 @@ def test_a_changed_constant_reaches_two_processes_compiling_at_once(workshop: Wo
     both = [workshop.start(), workshop.start()]
     assert [result(process) for process in both] == pytest.approx([-6e-6, -6e-6], rel=1e-12)
     assert len(workshop.compiled() - known) == 1
-    assert not list(workshop.cache.rglob("*.tmp"))
+    assert not list(workshop.cache.rglob(".*"))
 
 
 def test_a_damaged_cache_is_made_anew(workshop: Workshop) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hostile_page import assert_cannot_inject
 
+from hydraulic_node_utils.whole_file import write_text
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid import report
 from hydraulic_sysid.data import results
@@ -164,9 +165,9 @@ def test_foreign_files_are_not_written_over(tmp_path: Path, comparison: dict[str
 
 def test_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "compare.json"
-    results.write_text(path, "old")
+    write_text(path, "old")
     with pytest.raises(UnicodeEncodeError):
-        results.write_text(path, "new \udc80")
+        write_text(path, "new \udc80")
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 

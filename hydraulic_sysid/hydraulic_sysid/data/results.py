@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import platform
 from datetime import datetime, timezone
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 
 from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_node_utils.json_file import read_json
+from hydraulic_node_utils.whole_file import write_text
 
 FAMILY = "hydraulic_sysid."
 PAGE = "report.html"
@@ -72,20 +72,6 @@ def plain(value: Any, digits: int = _DIGITS) -> Any:
     if isinstance(value, np.integer):
         return int(value)
     return value if value is None or isinstance(value, int | str) else str(value)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all: into a neighbour first, then renamed over the old one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with draft.open("w", encoding="utf-8") as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def write_result(folder: Path, result: dict[str, Any]) -> Path:

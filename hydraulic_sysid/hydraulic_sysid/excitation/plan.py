@@ -14,8 +14,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_node_utils.whole_file import write_text
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.data.results import write_text
 from hydraulic_sysid.excitation.declared import Declared, number, section, text
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds

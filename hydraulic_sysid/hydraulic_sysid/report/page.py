@@ -16,8 +16,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from hydraulic_node_utils.whole_file import write_text
 from hydraulic_sysid.data import display
-from hydraulic_sysid.data.results import PAGE, PAGE_MARK, ResultError, verb_of, write_text
+from hydraulic_sysid.data.results import PAGE, PAGE_MARK, ResultError, verb_of
 
 Result = dict[str, Any]
 

@@ -14,8 +14,8 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
+from hydraulic_node_utils.whole_file import write_text
 from hydraulic_sysid.data.bag.types import MessageType
-from hydraulic_sysid.data.results import write_text
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9

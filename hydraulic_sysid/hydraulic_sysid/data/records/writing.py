@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import io
 import json
-import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from hydraulic_interfaces.contract import PISTON, PLANT_FRAME, SERVOVALVE, find_topic, topic
+from hydraulic_node_utils.whole_file import write_text
 from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.errors import BagError, FileError, RecordError
 from hydraulic_sysid.data.records.channels import CHANNELS, TIME_UNIT
@@ -33,8 +33,6 @@ def save_csv(record: Record, path: Path | str) -> Path:
     :raises FileError: the file exists.
     """
     path = Path(path)
-    if path.exists():
-        raise FileError(path, "exists already; a record is never written over another file")
     names = [f"time_{TIME_UNIT}", *(f"{name}_{record.unit(name)}" for name in record.channels)]
     text = io.StringIO()
     text.write(",".join(names) + "\n")
@@ -43,16 +41,10 @@ def save_csv(record: Record, path: Path | str) -> Path:
     data = text.getvalue().encode()
     if path.suffix == ".gz":
         data = gzip.compress(data, mtime=0)
-    handle, draft = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.absolute().parent)
     try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        os.chmod(draft, 0o644)
-        os.link(draft, path)  # unlike a rename, this never takes the place of a file that has come meanwhile
+        write_text(path, data, overwrite=False)
     except FileExistsError:
         raise FileError(path, "exists already; a record is never written over another file") from None
-    finally:
-        os.unlink(draft)
     return path
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from ruamel.yaml import YAML
 
-from hydraulic_sysid.data.results import write_text
+from hydraulic_node_utils.whole_file import write_text
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.amplitude import Limits
 from hydraulic_sysid.excitation.signals.playback import Playback

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from hydraulic_node_utils.json_file import read_json
-from hydraulic_sysid.data.results import EVERY_DIGIT, plain, write_text
+from hydraulic_node_utils.whole_file import write_text
+from hydraulic_sysid.data.results import EVERY_DIGIT, plain
 from hydraulic_sysid.linear.errors import IdentificationError
 
 from .arx import ArxModel, ArxOrder
