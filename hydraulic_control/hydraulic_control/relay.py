@@ -20,6 +20,7 @@ import numpy as np
 
 from hydraulic_control.errors import ControlError
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 _DRIFT_GAIN = 0.2  # of the relay's amplitude: how far its centre may follow a drift
 
@@ -30,6 +31,8 @@ class RelaySettings:
 
     That is after ``cycles`` that agree within ``agreement``; it is broken off beyond ``travel`` [m] from where it began
     or after ``time_limit`` [s].
+
+    :raises ParameterError: a value lies outside its range (`SPECS`).
     """
 
     amplitude: float = 0.5
@@ -40,19 +43,18 @@ class RelaySettings:
     time_limit: float = 10.0
 
     def __post_init__(self) -> None:
-        ranges = {
-            "amplitude": (1e-3, DRIVE_LIMIT_V, "V"),
-            "hysteresis": (0.0, 0.1, "m"),
-            "cycles": (3, 1000, ""),
-            "agreement": (1e-3, 0.5, ""),
-            "travel": (1e-5, 10.0, "m"),
-            "time_limit": (0.1, 600.0, "s"),
-        }
-        for name, (low, high, unit) in ranges.items():
-            value = getattr(self, name)
-            if not (math.isfinite(value) and low <= value <= high):
-                raise ControlError(f"relay {name} is {value:g} {unit}, must be {low:g} … {high:g} {unit}")
+        for spec in SPECS:
+            spec.check(getattr(self, spec.name))
 
+
+SPECS = (
+    ParameterSpec("amplitude", RelaySettings.amplitude, "of the relay", "V", 1e-3, DRIVE_LIMIT_V),
+    ParameterSpec("hysteresis", RelaySettings.hysteresis, "of the relay: three times the noise", "m", 0.0, 0.1),
+    ParameterSpec("cycles", RelaySettings.cycles, "that must agree", "", 3, 1000),
+    ParameterSpec("agreement", RelaySettings.agreement, "of their periods and amplitudes", "1", 1e-3, 0.5),
+    ParameterSpec("travel", RelaySettings.travel, "from the start, that breaks it off", "m", 1e-5, 10.0),
+    ParameterSpec("time_limit", RelaySettings.time_limit, "that breaks it off", "s", 0.1, 600.0),
+)
 
 @dataclass(frozen=True)
 class CriticalPoint:

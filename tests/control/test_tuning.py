@@ -21,6 +21,7 @@ from hydraulic_control.scenario import nominal, scattered
 from hydraulic_control.simulation import QUIET, SensorNoise, SimulatedPlant, run, step_reference
 from hydraulic_control.tuning import Criteria, cost_of, figures_of, optimise, try_step
 from hydraulic_control.verbs import evaluate, tune
+from hydraulic_node_utils.parameter_spec import ParameterError
 from hydraulic_sim.model_file import load_model
 
 MODEL = load_model("moog_mcr_m_1002_bench")
@@ -74,7 +75,7 @@ def test_the_relay_ends_at_its_limits(settings: RelaySettings, positions: list[f
 
 def test_relay_settings_have_ranges() -> None:
     for wrong in ({"amplitude": 11.0}, {"cycles": 1}, {"travel": math.inf}, {"time_limit": 0.0}):
-        with pytest.raises(ControlError, match=next(iter(wrong))):
+        with pytest.raises(ParameterError, match=next(iter(wrong))):
             RelaySettings(**wrong)  # type: ignore[arg-type]
 
 

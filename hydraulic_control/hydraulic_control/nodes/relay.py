@@ -16,7 +16,7 @@ from typing import Any
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 
-from hydraulic_control.relay import Relay, RelaySettings
+from hydraulic_control.relay import SPECS, Relay, RelaySettings
 from hydraulic_interfaces.contract import NAMESPACE, RELAY_NODE
 from hydraulic_interfaces.conversions import CommandEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
@@ -26,14 +26,8 @@ from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
-_USUAL = RelaySettings()
 PARAMETERS = (
-    ParameterSpec("amplitude", _USUAL.amplitude, "of the relay", "V", 1e-3, 10.0),
-    ParameterSpec("hysteresis", _USUAL.hysteresis, "of the relay: three times the noise", "m", 0.0, 0.1),
-    ParameterSpec("cycles", _USUAL.cycles, "that must agree", "", 3, 1000),
-    ParameterSpec("agreement", _USUAL.agreement, "of their periods and amplitudes", "1", 1e-3, 0.5),
-    ParameterSpec("travel", _USUAL.travel, "from the start, that breaks it off", "m", 1e-5, 10.0),
-    ParameterSpec("time_limit", _USUAL.time_limit, "that breaks it off", "s", 0.1, 600.0),
+    *SPECS,
     ParameterSpec("start_timeout", 30.0, "longest wait for a plant that obeys", "s", 0.1, 3600.0),
     ParameterSpec("state_timeout", 0.1, "silence of the state that breaks it off", "s", 0.01, 10.0),
     ParameterSpec("output", "", "JSON file for the result; empty: it is only told"),
@@ -48,8 +42,7 @@ class RelayNode(ServedNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(RELAY_NODE, namespace=NAMESPACE, **options)
         values = ParameterTable(self, PARAMETERS, locked=lambda: True).values()
-        names = vars(_USUAL)
-        self._relay = Relay(RelaySettings(**{name: values[name] for name in names}))
+        self._relay = Relay(RelaySettings(**{spec.name: values[spec.name] for spec in SPECS}))
         self._output, self._patience = values["output"], time.monotonic() + values["start_timeout"]
         self._timeout = values["state_timeout"]
         self._encode = CommandEncoder(RELAY_NODE)

@@ -1,1 +1,1 @@
-"""What every node of the hydraulic bench is built from: parameters with units, command line, orderly ends."""
+"""What every node and verb is built from: parameters with units, command lines, tables, orderly ends."""
