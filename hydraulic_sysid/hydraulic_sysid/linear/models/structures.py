@@ -61,25 +61,21 @@ class Arx(Structure):
 
     @property
     def text(self) -> str:
-        """See `Structure.text`."""
         return self.order.text + (" by instrumental variables" if self.instruments else "")
 
     @property
     def memory(self) -> int:
-        """See `Structure.memory`."""
         return self.order.memory
 
     def fit(self, drives: Arrays, outputs: Arrays, dt: float, offsets: str) -> LinearModel:
-        """See `Structure.fit`."""
         return (fit_arx_instruments if self.instruments else fit_arx)(drives, outputs, dt, self.order, offsets)
 
     def document(self) -> dict[str, Any]:
-        """See `Structure.document`."""
         method = "instrumental variables" if self.instruments else "least squares"
         return {"structure": "arx", "method": method, **vars(self.order)}
 
     def up_to(self) -> list[Structure]:
-        """See `Structure.up_to`; the dead time from 1 (or 0, where that is asked for) on."""
+        # the dead time from 1 (or 0, where that is asked for) on
         o = self.order
         ranges = range(1, o.na + 1), range(1, o.nb + 1), range(min(1, o.nk), o.nk + 1)
         orders = sorted(product(*ranges), key=lambda x: (x[0] + x[1], x[0], x[2]))
@@ -96,21 +92,18 @@ class TransferFunction(Structure):
 
     @property
     def text(self) -> str:
-        """See `Structure.text`."""
         return self.order.text + (f", dead time {self.delay * 1e3:g} ms" if self.delay else "")
 
     def fit(self, drives: Arrays, outputs: Arrays, dt: float, offsets: str) -> LinearModel:
-        """See `Structure.fit`."""
         return fit_transfer_function(
             drives, outputs, dt, self.order, delay=self.delay, offsets=offsets, method=self.method
         )
 
     def document(self) -> dict[str, Any]:
-        """See `Structure.document`."""
         return {"structure": "transfer function", "method": self.method, **vars(self.order), "delay": self.delay}
 
     def up_to(self) -> list[Structure]:
-        """See `Structure.up_to`; an integrator stays."""
+        # an integrator stays
         return [
             replace(self, order=replace(self.order, poles=poles, zeros=zeros))
             for poles in range(1, self.order.poles + 1)
@@ -128,21 +121,17 @@ class StateSpace(Structure):
 
     @property
     def text(self) -> str:
-        """See `Structure.text`."""
         return f"state space with {self.states} state{'s' if self.states > 1 else ''}"
 
     def fit(self, drives: Arrays, outputs: Arrays, dt: float, offsets: str) -> LinearModel:
-        """See `Structure.fit`."""
         return fit_state_space(
             drives, outputs, dt, self.states, horizon=self.horizon, direct=self.direct, offsets=offsets
         )
 
     def document(self) -> dict[str, Any]:
-        """See `Structure.document`."""
         return {"structure": "state space", "method": "subspace", "states": self.states, "direct": self.direct}
 
     def up_to(self) -> list[Structure]:
-        """See `Structure.up_to`."""
         return [replace(self, states=n) for n in range(1, self.states + 1)]
 
 
