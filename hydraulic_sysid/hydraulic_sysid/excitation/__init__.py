@@ -3,7 +3,6 @@
 from hydraulic_sysid.excitation.applied import AppliedDriveCheck
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError, PlaybackError
 from hydraulic_sysid.excitation.plan import Plan, load_plan, save_plan, shipped_plans
-from hydraulic_sysid.excitation.plant_report import PlantReport
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
 from hydraulic_sysid.excitation.session import NOT_STARTED, Session
 from hydraulic_sysid.excitation.signals import Signal, signal_kinds
@@ -16,7 +15,6 @@ __all__ = [
     "Phase",
     "Plan",
     "PlanError",
-    "PlantReport",
     "PlaybackError",
     "Session",
     "Signal",

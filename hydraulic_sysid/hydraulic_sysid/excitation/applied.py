@@ -7,26 +7,17 @@ from dataclasses import dataclass, field
 
 
 @dataclass
-class _Range:
-    """The least and the greatest of some values [V]."""
-
-    low: float = math.inf
-    high: float = -math.inf
-
-    def add(self, value: float) -> None:
-        if value < self.low:
-            self.low = value
-        if value > self.high:  # NaN fails both comparisons and leaves no trace
-            self.high = value
-
-    def joined(self, other: _Range) -> _Range:
-        return _Range(min(self.low, other.low), max(self.high, other.high))
-
-
-@dataclass
 class _Block:
-    commanded: _Range = field(default_factory=_Range)
-    applied: _Range = field(default_factory=_Range)
+    """Drives [V] of one block."""
+
+    commanded: list[float] = field(default_factory=list)
+    applied: list[float] = field(default_factory=list)
+
+
+def _range(values: list[float]) -> tuple[float, float]:
+    """The least and the greatest of some values; NaN leaves no trace."""
+    known = [value for value in values if value == value]
+    return min(known, default=math.inf), max(known, default=-math.inf)
 
 
 class AppliedDriveCheck:
@@ -49,13 +40,13 @@ class AppliedDriveCheck:
 
     def commanded(self, drive: float) -> None:
         """Note that `drive` [V] was commanded in answer to the latest state."""
-        self._block.commanded.add(drive)
+        self._block.commanded.append(drive)
 
     def fault(self, t: float, applied: float) -> str | None:
         """What is wrong with the applied drives up to `applied` [V] at `t` [s]; None while nothing is."""
         if self._block_end is None:
             self._block_end = t + self.window
-        self._block.applied.add(applied)
+        self._block.applied.append(applied)
         if t < self._block_end:
             return None
         found = self._verdict(self._last, self._block) if self._last is not None else None
@@ -64,16 +55,15 @@ class AppliedDriveCheck:
         return found if self._bad_blocks >= self.patience else None
 
     def _verdict(self, last: _Block, block: _Block) -> str | None:
-        if block.applied.low > block.applied.high:
+        low, high = _range(block.applied)
+        if low > high:
             return "the plant does not report the drive it applies"
-        allowed = last.commanded.joined(block.commanded)
-        wanted, seen = last.commanded, last.applied.joined(block.applied)
-        margin = 0.25 * (wanted.high - wanted.low) + self.tolerance
-        beyond = block.applied.low < allowed.low - self.tolerance or block.applied.high > allowed.high + self.tolerance
-        behind = seen.high < wanted.high - margin or seen.low > wanted.low + margin
+        least, most = _range(last.commanded + block.commanded)
+        wanted_low, wanted_high = _range(last.commanded)
+        seen_low, seen_high = _range(last.applied + block.applied)
+        margin = 0.25 * (wanted_high - wanted_low) + self.tolerance
+        beyond = low < least - self.tolerance or high > most + self.tolerance
+        behind = seen_high < wanted_high - margin or seen_low > wanted_low + margin
         if not beyond and not behind:
             return None
-        return (
-            f"the plant applied {block.applied.low:.3f} … {block.applied.high:.3f} V"
-            f" while {allowed.low:.3f} … {allowed.high:.3f} V was commanded"
-        )
+        return f"the plant applied {low:.3f} … {high:.3f} V while {least:.3f} … {most:.3f} V was commanded"

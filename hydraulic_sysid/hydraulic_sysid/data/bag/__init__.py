@@ -9,15 +9,13 @@ from hydraulic_sysid.data.bag.metadata import BagTopic, offered_qos
 from hydraulic_sysid.data.bag.recording import Recording
 from hydraulic_sysid.data.bag.recovery import Recovery, recover
 from hydraulic_sysid.data.bag.stop_rule import StopRule
-from hydraulic_sysid.data.bag.types import MessageType, message_type
-from hydraulic_sysid.data.bag.writer import BagSummary, BagWriter
+from hydraulic_sysid.data.bag.types import message_type
+from hydraulic_sysid.data.bag.writer import BagWriter
 
 __all__ = [
-    "BagSummary",
     "BagTopic",
     "BagWriter",
     "ExperimentLog",
-    "MessageType",
     "Recording",
     "Recovery",
     "StopRule",

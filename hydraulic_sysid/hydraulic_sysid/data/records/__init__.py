@@ -1,7 +1,7 @@
 """Records: what was measured in one experiment, and how it is read from bags, CSV and MAT files."""
 
 from hydraulic_sysid.data.errors import BagError, ChannelError, ColumnMapError, FileError, RecordError, TimeError
-from hydraulic_sysid.data.records.channels import CHANNELS, Channel
+from hydraulic_sysid.data.records.channels import CHANNELS
 from hydraulic_sysid.data.records.column_map import ColumnMap, load_column_map, parse_column_map, shipped_maps
 from hydraulic_sysid.data.records.reading import read_all, read_records
 from hydraulic_sysid.data.records.record import Record
@@ -10,7 +10,6 @@ from hydraulic_sysid.data.records.writing import save_csv, to_bag
 __all__ = [
     "CHANNELS",
     "BagError",
-    "Channel",
     "ChannelError",
     "ColumnMap",
     "ColumnMapError",

@@ -13,7 +13,6 @@ pressures that the record lacks, and inner states of effects, as they are in the
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,9 +101,8 @@ def predict(model: Model, plant: Plant, data: Measured, horizon: float, inner: A
     every = np.arange(count - 1)
     raw = _start_values(data, smoothed=False)
     step = plant.predict(drive, dt, every, 1, _states(plant, raw, inner, every))
-    finish = _finisher(model, data)
     free["velocity"] = data.velocity_filter(free["position"])
-    ahead_channels = finish(leads)
+    ahead_channels = _compared(model, data, leads)
     lead_index = np.unique(np.round(np.geomspace(1, ahead, 24)).astype(np.int64))
     growth = {
         name: np.sqrt(np.mean((data.channels[name][starts[:, None] + lead_index] - values[:, lead_index]) ** 2, axis=0))
@@ -112,9 +110,9 @@ def predict(model: Model, plant: Plant, data: Measured, horizon: float, inner: A
         if name in data.compared
     }
     return Predictions(
-        free_run=finish(free),
+        free_run=_compared(model, data, free),
         horizon={name: _tile(values, starts, ahead, stride, count) for name, values in ahead_channels.items()},
-        one_step=finish({n: np.concatenate(([np.nan], step[n][:, 1])) for n in _SENSED}),
+        one_step=_compared(model, data, {n: np.concatenate(([np.nan], step[n][:, 1])) for n in _SENSED}),
         growth_lead=dt * lead_index.astype(float),
         growth_rms=growth,
     )
@@ -145,12 +143,8 @@ def _tile(values: Array, starts: Index, ahead: int, stride: int, count: int) -> 
     return tiled
 
 
-def _finisher(model: Model, data: Measured) -> Callable[[dict[str, Array]], dict[str, Array]]:
-    """Adds the load pressure and keeps what the record can be compared with."""
-
-    def finish(channels: dict[str, Array]) -> dict[str, Array]:
-        if "load_pressure" in data.channels:
-            channels["load_pressure"] = load_pressure(channels["pressure_a"], channels["pressure_b"], model)
-        return {name: channels[name] for name in data.compared}
-
-    return finish
+def _compared(model: Model, data: Measured, channels: dict[str, Array]) -> dict[str, Array]:
+    """What the record can be compared with, the load pressure among it."""
+    if "load_pressure" in data.channels:
+        channels["load_pressure"] = load_pressure(channels["pressure_a"], channels["pressure_b"], model)
+    return {name: channels[name] for name in data.compared}

@@ -2,22 +2,19 @@
 
 from hydraulic_sysid.linear.errors import IdentificationError
 
-from .arx import ArxModel, ArxOrder, fit_arx
+from .arx import ArxOrder, fit_arx
 from .experiments import OFFSETS
 from .instrumental_variables import fit_arx_instruments
 from .model import LinearModel
 from .model_file import read_linear_model, write_linear_model
 from .order_selection import CRITERIA, Candidate, best, try_orders
-from .poles import Pole
 from .recursive_arx import RecursiveArx
-from .state_space import StateSpaceModel
 from .structures import Arx, StateSpace, Structure, TransferFunction
 from .subspace import fit_state_space
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
 from .transfer_function_fit import fit_transfer_function
 
 __all__ = [
-    "ArxModel",
     "ArxOrder",
     "fit_arx",
     "fit_transfer_function",
@@ -30,10 +27,8 @@ __all__ = [
     "Candidate",
     "best",
     "try_orders",
-    "Pole",
     "RecursiveArx",
     "OFFSETS",
-    "StateSpaceModel",
     "Arx",
     "StateSpace",
     "Structure",

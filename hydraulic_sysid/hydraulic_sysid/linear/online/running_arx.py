@@ -1,20 +1,96 @@
-"""An ARX model estimated from a fast stream: sampling, recursive least squares and its fit, in one."""
+"""An ARX model estimated from a fast stream of (drive, output): sampling, recursive least squares, and its fit.
+
+The stream is brought to the model's sampling time as it comes; see `resampling` for the rule.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from hydraulic_sysid.linear.models import ArxOrder, IdentificationError, RecursiveArx, write_linear_model
 from hydraulic_sysid.linear.models.recursive_arx import Step
 
-from .running_fit import RunningFit
-from .slow_sampler import SlowSampler
-
 UNITS = {"position": "m", "velocity": "m/s", "force": "N"}
 """What can be modelled, and its unit."""
 _USUAL_SIZES = {"position": 0.1, "velocity": 0.1, "force": 1e4}
 _USUAL_DRIVE = 1.0
+
+
+@dataclass(frozen=True)
+class SlowSample:
+    """At ``stamp_ns``: the ``output`` then, and the mean ``drive`` over the sample that ended there.
+
+    ``follows``: whether the sample before it in time was given out too; not after a gap, nor at first.
+    """
+
+    stamp_ns: int
+    drive: float
+    output: float
+    follows: bool
+
+
+class SlowSampler:
+    """Averages the held drive over each slow sample and takes the output at its end, by a straight line if between.
+
+    A sample that comes later than ``longest_gap_ns`` after the one before, or before it, starts anew.
+    """
+
+    def __init__(self, period_ns: int, longest_gap_ns: int) -> None:
+        self.period_ns, self.longest_gap_ns = period_ns, longest_gap_ns
+        self._last: tuple[int, float, float] | None = None
+        self._end_ns = 0
+        self._volt_ns = 0.0
+        self._follows = False
+
+    def take(self, stamp_ns: int, drive: float, output: float) -> list[SlowSample]:
+        """The slow samples that ended with this state, whose ``drive`` is applied from ``stamp_ns`` on."""
+        last, self._last = self._last, (stamp_ns, drive, output)
+        if last is None or not 0 < stamp_ns - last[0] <= self.longest_gap_ns:
+            self._end_ns, self._volt_ns, self._follows = stamp_ns + self.period_ns, 0.0, False
+            return []
+        before_ns, held, before = last
+        found, now_ns = [], before_ns
+        while self._end_ns <= stamp_ns:
+            self._volt_ns += held * (self._end_ns - now_ns)
+            share = (self._end_ns - before_ns) / (stamp_ns - before_ns)
+            at_end = before + share * (output - before)
+            found.append(SlowSample(self._end_ns, self._volt_ns / self.period_ns, at_end, self._follows))
+            now_ns, self._volt_ns, self._follows = self._end_ns, 0.0, True
+            self._end_ns += self.period_ns
+        self._volt_ns += held * (stamp_ns - now_ns)
+        return found
+
+
+class RunningFit:
+    """Best fit 100·(1 − √(Σe²/Σ(y − ȳ)²)), every sum with the weight λⁿ of a sample n samples ago."""
+
+    def __init__(self, forgetting: float) -> None:
+        self.forgetting = forgetting
+        self._weight = self._mean = self._spread = self._squares = 0.0
+
+    def take(self, measured: float, predicted: float) -> None:
+        """One more sample."""
+        keep = self.forgetting
+        before = self._weight
+        self._weight = keep * before + 1.0
+        away = measured - self._mean
+        self._mean += away / self._weight
+        # West's update of a weighted variance (Comm. ACM 22 (1979) 532–535), with decaying weights.
+        self._spread = keep * self._spread + away * (measured - self._mean)
+        self._squares = keep * self._squares + (measured - predicted) ** 2
+
+    @property
+    def best_fit(self) -> float:
+        """Percent; NaN before the output has moved."""
+        return 100.0 * (1.0 - math.sqrt(self._squares / self._spread)) if self._spread > 0.0 else math.nan
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the error of late, in the output's unit; NaN before the first sample."""
+        return math.sqrt(self._squares / self._weight) if self._weight else math.nan
 
 
 class RunningArx:
