@@ -111,7 +111,7 @@ def minimise(
             else:
                 damping *= 8.0
         if better is None:
-            return Minimum(point, _ahead(normal, point.parameters) < _UPHILL, number)
+            return Minimum(point, not tolerance or _ahead(normal, point.parameters) < _UPHILL, number)
         damping = max(damping / 5.0, LEAST_DAMPING)
         gain = (point.cost - better.cost) / point.cost
         point = accepted(number, better)

@@ -55,6 +55,12 @@ class Parameters:
         values = np.array([model.value(k) for k in keys], dtype=float)
         return cls(keys, values, np.array([scale(model, k) for k in keys], dtype=float), low, high)
 
+    @classmethod
+    def unbounded(cls, values: Array) -> Parameters:
+        """Numbers that may be anything, of scale one."""
+        infinite = np.full(values.size, np.inf)
+        return cls(tuple(map(str, range(values.size))), values, np.ones(values.size), -infinite, infinite)
+
     def __len__(self) -> int:
         return len(self.keys)
 

@@ -2,22 +2,23 @@
 
     minimise over α:  ‖y − Φ(α)·θ̂(α)‖²,   θ̂(α) = Φ(α)⁺·y,   Φ = [σᵏ/α·u, 1/α·1, free responses]
 
-by damped Gauss–Newton steps with the projected Jacobian of [2] (variable projection [1]). The initial state of every
-experiment is among the linear unknowns.
-
-[1] G. Golub, V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413–432.
-[2] L. Kaufman, *BIT* 15 (1975) 49–57.
+by variable projection (`estimation.projection`) and Levenberg–Marquardt steps. The initial state of every experiment is
+among the linear unknowns.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
+from hydraulic_sysid.estimation.parameters import Parameters
+from hydraulic_sysid.estimation.projection import project_out
 from hydraulic_sysid.linear.errors import IdentificationError
 
 from .held_filter import Derivatives, Filter
@@ -64,6 +65,7 @@ class Problem:
 class Point:
     """One denominator with the best of everything else: ``theta`` linear unknowns, ``residual`` y − Φθ."""
 
+    problem: Problem
     alpha: Array
     theta: Array
     residual: Array
@@ -75,6 +77,24 @@ class Point:
     def cost(self) -> float:
         """Sum of squared residuals."""
         return float(self.residual @ self.residual)
+
+    @property
+    def parameters(self) -> Parameters:
+        """α₁ … α_n, without bounds."""
+        return Parameters.unbounded(self.alpha)
+
+    @cached_property
+    def normal(self) -> NormalEquations:
+        """With the linear unknowns eliminated, residuals in units of their standard deviation."""
+        basis, _ = np.linalg.qr(self.columns / np.linalg.norm(self.columns, axis=0))
+        projected = -project_out(basis, self.jacobian)
+        variance = max(self.cost / self.residual.size, float(np.finfo(float).tiny))
+        return NormalEquations(projected.T @ projected / variance, ((projected.T @ self.residual / variance)[None],))
+
+    def moved(self, change: Array) -> Point | None:
+        """Another denominator; None where the model would grow beyond bounds."""
+        alpha = self.alpha + change
+        return evaluate(self.problem, alpha) if self.problem.allowed(alpha) else None
 
 
 def evaluate(problem: Problem, alpha: Array) -> Point:
@@ -96,32 +116,7 @@ def evaluate(problem: Problem, alpha: Array) -> Point:
         own = np.concatenate((theta[: problem.shared], theta[first : first + problem.poles]))
         slopes.append(np.stack([s @ own for s in sensitivities], axis=1))
     residual = problem.target - columns @ theta
-    return Point(alpha, theta, residual, np.vstack(slopes), columns)
-
-
-def refine(problem: Problem, start: Point, steps: int = 60, tolerance: float = 1e-9) -> tuple[Point, bool]:
-    """Damped Gauss–Newton from ``start``; the best point found and whether it has settled."""
-    best, damping = start, 1e-3
-    for _ in range(steps):
-        basis, _ = np.linalg.qr(best.columns / np.linalg.norm(best.columns, axis=0))
-        projected = best.jacobian - basis @ (basis.T @ best.jacobian)
-        normal, gradient = projected.T @ projected, projected.T @ best.residual
-        better = None
-        while better is None and damping < 1e9:
-            move = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
-            expected = float(gradient @ move)
-            if expected <= tolerance * best.cost:
-                return best, True
-            candidate = best.alpha + move
-            point = evaluate(problem, candidate) if problem.allowed(candidate) else None
-            if point is not None and point.cost < best.cost:
-                better, damping = point, max(0.1 * damping, 1e-12)
-            else:
-                damping *= 10.0
-        if better is None:
-            return best, True  # no step, however short, makes it better
-        best = better
-    return best, False
+    return Point(problem, alpha, theta, residual, np.vstack(slopes), columns)
 
 
 def _experiment(problem: Problem, filters: Filter, u: Array) -> tuple[Array, list[Array]]:

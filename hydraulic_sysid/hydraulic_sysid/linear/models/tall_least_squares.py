@@ -13,8 +13,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.estimation.covariance import of_columns
 from hydraulic_sysid.linear.errors import IdentificationError
 
 _BLOCK = 1024
@@ -70,16 +72,21 @@ def solve(chunks: Iterable[Sequence[Array]]) -> Solution:
     k = r.shape[1] - 1
     if len(r) <= k:  # as many rows as unknowns: nothing is left over
         r = np.vstack((r, np.zeros((k + 1 - len(r), k + 1))))
-    lengths = np.linalg.norm(r[:, :k], axis=0)
-    if not lengths.all():
+    if not r[:, :k].any(axis=0).all():
         raise IdentificationError("the drive or the output is zero throughout: nothing can be identified")
-    left, singular, right = np.linalg.svd(r[:k, :k] / lengths)
-    condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
+    covariance, condition = of_columns(r[:k, :k])
+    check_condition(condition)
+    theta = solve_triangular(r[:k, :k], r[:k, k])
+    return Solution(theta, covariance, condition, float(r[k, k] ** 2), rows)
+
+
+def check_condition(condition: float) -> None:
+    """Refuse columns that are as good as dependent.
+
+    :raises IdentificationError: they are.
+    """
     if condition > _WORST:
         raise IdentificationError(
             f"the record does not excite a model of this order (condition number {condition:.1e}): "
             "lower the order or use a richer drive"
         )
-    theta = (right.T @ ((left.T @ r[:k, k]) / singular)) / lengths
-    scaled = right.T / singular
-    return Solution(theta, (scaled @ scaled.T) / np.outer(lengths, lengths), condition, float(r[k, k] ** 2), rows)

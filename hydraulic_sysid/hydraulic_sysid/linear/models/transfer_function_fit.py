@@ -8,16 +8,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.estimation.covariance import of_columns
+from hydraulic_sysid.estimation.levenberg_marquardt import Minimum, minimise
+from hydraulic_sysid.estimation.projection import project_out
 from hydraulic_sysid.linear.errors import IdentificationError
 
 from .experiments import experiments
 from .noise_model import fit_noise
-from .output_error import Point, Problem, refine
+from .output_error import Point, Problem
 from .srivc import refined_iv
+from .tall_least_squares import check_condition
 from .transfer_function import TransferFunctionModel, TransferFunctionOrder
 
 METHODS = ("output error", "srivc")
 _CUTOFFS = (0.3, 1.0, 3.0, 10.0, 30.0)
+_MOST_STEPS, _LEAST_GAIN = 60, 1e-9
 
 
 def fit_transfer_function(
@@ -51,8 +56,8 @@ def fit_transfer_function(
         inputs, measured, scale * dt, order.poles, order.zeros, order.integrator, offsets == "estimate", delay / dt
     )
     start = _start(problem)
-    point, converged = refine(problem, start) if method == "output error" else (start, True)
-    return _model(problem, point, scale, dt, order, delay, (u0, y0), method, converged)
+    found = minimise(start, _MOST_STEPS, _LEAST_GAIN) if method == "output error" else Minimum(start, True, 0)
+    return _model(problem, found.point, scale, dt, order, delay, (u0, y0), method, found.converged)
 
 
 def _check(inputs: Sequence[Array], outputs: Sequence[Array], order: TransferFunctionOrder) -> None:
@@ -100,20 +105,11 @@ def _model(
         (np.arange(1, order.free_poles + 1), np.arange(n - m, n + 1), [n] if problem.constant else [])
     )
     joint = _without_states(np.hstack((point.jacobian, point.columns)), point.alpha.size + problem.shared)
-    lengths = np.linalg.norm(joint, axis=0)
-    if not lengths.all():
-        raise IdentificationError("the record says nothing about some coefficients: lower the order")
-    _, singular, right = np.linalg.svd(joint / lengths, full_matrices=False)
-    condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
-    if condition > 1e12:
-        raise IdentificationError(
-            f"the record does not excite a model of this order (condition number {condition:.1e}): "
-            "lower the order or use a richer drive"
-        )
+    covariance, condition = of_columns(joint)
+    check_condition(condition)
     samples = point.residual.size
-    weights = (right.T / singular) / lengths[:, None]
     variance = point.cost / (samples - point.alpha.size - point.columns.shape[1])
-    errors = np.sqrt(variance * np.sum(weights**2, axis=1))[: size.size]
+    errors = np.sqrt(variance * np.diag(covariance))[: size.size]
     bounds = np.cumsum([y.size for y in problem.outputs])[:-1]
     noise, one_step = fit_noise(np.split(point.residual, bounds))
     return TransferFunctionModel(
@@ -145,4 +141,4 @@ def _without_states(joint: Array, own: int) -> Array:
     lengths = np.linalg.norm(states, axis=0)
     left, singular, _ = np.linalg.svd(states / np.where(lengths > 0.0, lengths, 1.0), full_matrices=False)
     basis = left[:, singular > 1e-10 * singular[0]]
-    return model - basis @ (basis.T @ model)
+    return project_out(basis, model)
