@@ -101,4 +101,4 @@ def _balances(
         found = locate(model, records, maps=False)
     except (LocateError, SimulationError):
         return [], []
-    return found["balances"], [str(s["name"]) for s in found["subsystem"]]
+    return found["balances"], [str(s["name"]) for s in found["attribution"]]

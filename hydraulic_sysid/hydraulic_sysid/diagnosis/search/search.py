@@ -195,6 +195,12 @@ class Search:
         path, added = [base], list[str]()
         while len(added) < MOST_EFFECTS:
             better = self.finish(path[-1], partial(_worth, base, path[-1], added) if added else _anything)
+            if better is not None and not added:
+                # The fit with an effect may have gone on where that without it had stopped.
+                plain = self.state(better.model.without_effect(_new(better, base)), self._last)
+                if not material(plain.misfit, better.misfit):
+                    base = replace(plain, refits=base.refits, scores=base.scores)
+                    path, better = [base], None
             if better is None:
                 break
             added.append(_new(better, path[-1]))
