@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from system.test_demo import Demo, Finished, finished
+from system.test_demo import PATIENCE_S, Demo, Finished, finished
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
@@ -16,7 +16,7 @@ from hydraulic_sysid.data.records import read_records
 from hydraulic_sysid.estimation.metrics import best_fit
 
 pytest.importorskip("rclpy")
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(PATIENCE_S + 60.0)
 
 AS_BUILT = Path(str(resources.files("hydraulic_bringup.demo") / "models" / "as_built.yaml"))
 

@@ -32,13 +32,14 @@ SHIPPED = Path(__file__).parents[2] / "hydraulic_can_driver" / "hydraulic_can_dr
 CHANNEL = "vcanbench"
 RATE = 2.5  # the drive is sent a quarter of the period before its SYNC, and the loop wakes up to 50 ms late
 SHORTEST = 5  # samples of a piece of the record between two lost ones
+DURATION = 36.0  # of the excitation, s
 PATIENCE_S = 10.0
-MACHINE_S = 900.0  # a machine that is busy besides; with two free processors it takes a minute and a half
+MACHINE_S = 900.0  # a machine that is busy besides; with two free processors it takes a minute
 
 PLAN = f"""
 name: multisine
 signal: {{kind: random_phase_multisine, rms: 1.0, period: 12.0, frequency_min: 0.1, frequency_max: 1.0, seed: 1}}
-duration: 60.0
+duration: {DURATION}
 rate: {RATE}
 fade_in: 0.25
 fade_out: 0.25
@@ -172,7 +173,7 @@ def test_the_state_machine_is_climbed_step_by_step_and_left_at_0(run: Run) -> No
 
 def test_the_kernel_sends_the_sync_and_every_device_answers_it(run: Run) -> None:
     syncs = np.array([f.time for f in run.of(SYNC)])
-    assert len(syncs) > 60.0 * RATE
+    assert len(syncs) > DURATION * RATE
     assert np.median(np.diff(syncs)) == pytest.approx(1.0 / RATE, rel=0.05)  # as good as an emulated clock
     answers = {number: len(run.of(number)) for number in SAMPLED}
     assert min(answers.values()) >= 0.97 * len(syncs), answers
@@ -187,7 +188,7 @@ def test_the_record_holds_what_was_on_the_wire(run: Run) -> None:
     drives = np.array([int.from_bytes(f.data[2:4], "little", signed=True) for f in run.of(DRIVE)]) * 10.0 / 16384
     pieces = read_records(run.folder / "bag", "split")
     found = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0].channels}
-    assert len(found["position"]) > 24.0 * RATE
+    assert len(found["position"]) > 0.4 * DURATION * RATE
     assert share_among(found["position"], wire) > 0.95
     assert share_among(found["drive"], drives) > 0.95
     assert np.ptp(found["position"]) > 0.01
@@ -209,7 +210,7 @@ def test_the_plant_is_identified_from_the_record(run: Run) -> None:
     Sampled, they are 1 − (1 + p) z⁻¹ + p z⁻² with p = exp(−T/LAG), and b₁ + b₂ = GAIN · T · (1 − p).
     """
     pieces = [piece for piece in read_records(run.folder / "bag", "split") if len(piece) >= SHORTEST]
-    assert sum(map(len, pieces)) > 20.0 * RATE, f"pieces of {[len(piece) for piece in pieces]} samples"
+    assert sum(map(len, pieces)) > 0.33 * DURATION * RATE, f"pieces of {[len(piece) for piece in pieces]} samples"
     drives, positions = ([np.asarray(piece[name]) for piece in pieces] for name in ("drive", "position"))
     longest = int(np.argmax([len(piece) for piece in pieces]))
     half = len(pieces[longest]) // 2  # the second half of the longest piece is held out

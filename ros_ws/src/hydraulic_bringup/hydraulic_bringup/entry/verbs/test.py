@@ -50,7 +50,8 @@ def run(bench: Bench, arguments: list[str]) -> int:
     with tempfile.TemporaryDirectory(prefix="bench_test_") as memory:
         pytest = [*python, "pytest", "-o", f"cache_dir={memory}", "-m"]
         first = [folder for folder in LONGEST if (root / folder).is_dir()]
-        spread = ["-p", "xdist", "-n", str(len(os.sched_getaffinity(0))), "--dist=loadfile", "--no-loadscope-reorder"]
+        workers = len(os.sched_getaffinity(0)) + 1  # one more than processors: some always wait for nodes
+        spread = ["-p", "xdist", "-n", str(workers), "--dist=loadfile", "--no-loadscope-reorder"]
         runs = [
             Pytest([*pytest, "not timing", *spread, *first, "tests"], root, variables),
             Pytest([*pytest, "timing", "tests"], root, variables),
