@@ -79,9 +79,8 @@ class ExcitationNode(ServedNode):
         self.over = not self._session.busy
 
     def close(self) -> None:
-        """Let the last messages arrive before the publishers go."""
-        for publisher in (self._experiment, self._command):
-            publisher.wait_for_all_acked(Duration(seconds=1))
+        """Let the last word of the experiment arrive: what got lost is repeated after 3 s (heartbeat of Fast DDS)."""
+        self._experiment.wait_for_all_acked(Duration(seconds=4))
 
     def _arm(self, plan: Plan, patience: float) -> None:
         self._patience_ends = time.monotonic() + patience

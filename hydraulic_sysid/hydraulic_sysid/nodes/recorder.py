@@ -41,7 +41,7 @@ PARAMETERS = (
     ParameterSpec("exit_when_done", False, "leave once the bag is closed"),
 )
 _POLL_S = 0.02
-_STATUS_S = 0.2
+_STATUS_S = 0.05
 _DIAGNOSTICS_S = 1.0
 _ACKNOWLEDGE_S = 1.0
 

@@ -36,7 +36,7 @@ BUS = "bench"
 # Nothing can break here, and a laptop that holds a process up for longer than the bench's 50 ms should not end a demo.
 WATCHDOG_S = 0.2
 SILENCE_S = 10.0  # of a plant in lockstep, until the excitation aborts
-FASTEST = 10.0  # plant seconds per second of a simulator in lockstep, where the answers come so fast
+FASTEST = 4.0  # plant seconds per second of a simulator in lockstep, where the answers come so fast
 # A simulated actuator may be excited again after an abort, also behind virtual CAN devices.
 ATTEMPTS = 2
 _CLIENT = "hydraulic_bringup.nodes._graph_client"
