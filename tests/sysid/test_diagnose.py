@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from hydraulic_sim.model_file import load_model
-from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
@@ -53,7 +52,7 @@ def model():
 
 
 def test_every_third_block_validates_shifting_between_records(model) -> None:
-    parts = split([standing(20.0, "a"), standing(20.0, "b")], [], Plant(model), 0.5)
+    parts = split([standing(20.0, "a"), standing(20.0, "b")], [], model.kind, 0.5)
     shares = [float(f.mean()) for f in parts.fit]
     assert all(0.6 <= s <= 0.72 for s in shares)
     assert not np.array_equal(parts.fit[0], parts.fit[1])
@@ -62,7 +61,7 @@ def test_every_third_block_validates_shifting_between_records(model) -> None:
 
 
 def test_named_records_are_for_validation_whole(model) -> None:
-    parts = split([standing(5.0, "a")], [standing(5.0, "b")], Plant(model), 0.5)
+    parts = split([standing(5.0, "a")], [standing(5.0, "b")], model.kind, 0.5)
     assert parts.fit[0].all() and not parts.fit[1].any()
     assert [s.record.name for s in parts.to_fit] == ["a"] == [r.name for r in parts.records()]
     assert [r.name for r in parts.records(validation=True)] == ["b"]
@@ -103,7 +102,7 @@ def test_a_line_that_the_valve_modulates_is_found_between_side_bands(line: float
     record = Record.sampled("r", DT, {"drive": drive, "position": np.zeros(time.size)})
     nothing = np.zeros(0)
     segments = Segments(
-        record, first, 501, ("position",), nothing, nothing, nothing, nothing, free=np.arange(2), prior_std=nothing
+        record, first, 501, ("position",), nothing, nothing, nothing, free=np.arange(2), prior_std=nothing
     )
     residual = np.concatenate([seen[first[:, None] + np.arange(501)], np.zeros((len(first), 2))], axis=1)
     assert spectral_lines([segments], [residual])[0] == pytest.approx(line, abs=0.01)

@@ -195,7 +195,7 @@ def fit(
     if not records:
         raise CalibrationError("there is no record to calibrate on")
     plant = Plant(model)
-    return fit_segments(plant, cut(records, plant, settings.length, settings.robust), keys, settings, progress)
+    return fit_segments(plant, cut(records, model.kind, settings.length, settings.robust), keys, settings, progress)
 
 
 def fit_segments(

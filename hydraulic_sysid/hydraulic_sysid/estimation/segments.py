@@ -40,9 +40,9 @@ class Segments:
     """The segments of one record.
 
     ``first`` (S,) sample indices, ``samples`` per segment; ``measured`` (S, samples, C) in units of ``noise_std`` (C,);
-    ``initial_states`` (S, n_states) to start from; ``smoothed`` (N, 4) position, velocity and pressures of the whole
-    record, NaN where they were not measured; ``free`` the indices of the states that are estimated, F of them, and
-    ``prior_std`` (F,) how far each may be off [the state's unit].
+    ``smoothed`` (N, 4) position, velocity and pressures of the whole record, NaN where they were not measured; ``free``
+    the indices of the states that are estimated, F of them, and ``prior_std`` (F,) how far each may be off [the state's
+    unit].
     """
 
     record: Record
@@ -51,7 +51,6 @@ class Segments:
     channels: tuple[str, ...]
     noise_std: Array
     measured: Array
-    initial_states: Array
     smoothed: Array
     free: Index
     prior_std: Array
@@ -61,12 +60,21 @@ class Segments:
 
     def subset(self, chosen: Mask) -> Segments:
         """Those segments that are ``chosen`` (S,)."""
-        return replace(
-            self,
-            first=self.first[chosen],
-            measured=self.measured[chosen],
-            initial_states=self.initial_states[chosen],
-        )
+        return replace(self, first=self.first[chosen], measured=self.measured[chosen])
+
+    def initial_states(self, plant: Plant) -> Array:
+        """Where a plant's states begin (S, n_states): as measured, the rest at ease."""
+        states = np.tile(plant.initial_state().states, (len(self), 1))
+        command = np.clip(self.record["drive"] / plant.value("drive_limit"), -1.0, 1.0)
+        begin = self.smoothed[self.first]
+        for column, name in enumerate(plant.state_names):
+            if name in _STATES:
+                states[:, column] = np.where(np.isfinite(begin[:, column]), begin[:, column], states[:, column])
+            elif name == "stick":
+                states[:, column] = np.clip(begin[:, _STATES.index("velocity")] / _STICK_SPEED, -1.0, 1.0)
+            elif plant.layout.state_records[name].initial == "command":
+                states[:, column] = command[np.maximum(self.first - 1, 0)]
+        return states
 
     def by_channel(self, residual: Array) -> Array:
         """Residuals (S, m) without the priors' part: (S, samples, C)."""
@@ -87,17 +95,18 @@ class Segments:
         return replace(self, noise_std=noise_std, measured=self.measured * ratio, prior_std=prior)
 
 
-def cut(records: Sequence[Record], plant: Plant, length: float, robust: bool = False) -> list[Segments]:
+def cut(records: Sequence[Record], kind: str, length: float, robust: bool = False) -> list[Segments]:
     """Cut records into equal segments of about ``length`` seconds; one as long as the record is a free run.
 
-    ``robust``: the noise must not follow outliers either.
+    :param kind: of the plant; only a hydraulic one has pressures
+    :param robust: the noise must not follow outliers either
 
     :raises SegmentError: a record without drive or position, or too short; the message names it.
     """
-    return [_cut(record, plant, length, robust) for record in records]
+    return [_cut(record, kind == "hydraulic", length, robust) for record in records]
 
 
-def _cut(record: Record, plant: Plant, length: float, robust: bool) -> Segments:
+def _cut(record: Record, hydraulic: bool, length: float, robust: bool) -> Segments:
     for channel in ("drive", "position"):
         if channel not in record:
             raise SegmentError(f"{record.name}: no channel {channel!r}; a calibration needs drive and position")
@@ -113,7 +122,6 @@ def _cut(record: Record, plant: Plant, length: float, robust: bool) -> Segments:
             f"are needed (the record has {len(record)})"
         )
     first: Index = (samples - 1) * np.arange(number, dtype=np.int64)
-    hydraulic = plant.model.kind == "hydraulic"
     channels = tuple(c for c in MEASURED if c in record and (hydraulic or c == "position"))
     noise = np.array([_noise(record[c], robust) for c in channels])
     index = first[:, None] + np.arange(samples)
@@ -121,9 +129,7 @@ def _cut(record: Record, plant: Plant, length: float, robust: bool) -> Segments:
     prior = {"velocity": _VELOCITY} | {c: _PRIOR[c] * sigma for c, sigma in zip(channels, noise, strict=True)}
     free = np.arange(len(_STATES) if hydraulic else 2)
     prior_std = np.array([prior.get(_STATES[k], _UNMEASURED_PRESSURE) for k in free])
-    smoothed = _smoothed(record, channels)
-    states = _states(record, plant, smoothed, first)
-    return Segments(record, first, samples, channels, noise, measured, states, smoothed, free, prior_std)
+    return Segments(record, first, samples, channels, noise, measured, _smoothed(record, channels), free, prior_std)
 
 
 def _noise(values: Array, robust: bool) -> float:
@@ -138,18 +144,3 @@ def _smoothed(record: Record, channels: tuple[str, ...]) -> Array:
     found["velocity"] = VelocityFilter.for_signal(position, record.dt, noise_std(position))(position)
     missing = np.full(len(record), np.nan)
     return np.stack([found.get(name, missing) for name in _STATES], axis=-1)
-
-
-def _states(record: Record, plant: Plant, smoothed: Array, first: Index) -> Array:
-    """Initial states: as measured, the rest at ease."""
-    states = np.tile(plant.initial_state().states, (first.size, 1))
-    command = np.clip(record["drive"] / plant.value("drive_limit"), -1.0, 1.0)
-    for column, name in enumerate(plant.state_names):
-        if name in _STATES:
-            known = np.isfinite(smoothed[first, column])
-            states[known, column] = smoothed[first[known], column]
-        elif name == "stick":
-            states[:, column] = np.clip(smoothed[first, _STATES.index("velocity")] / _STICK_SPEED, -1.0, 1.0)
-        elif plant.layout.state_records[name].initial == "command":
-            states[:, column] = command[np.maximum(first - 1, 0)]
-    return states

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -39,10 +39,10 @@ class Shooting:
     segments: Sequence[Segments]
     misfit: float = 1.0
 
-    @property
+    @cached_property
     def initial_states(self) -> list[Array]:
         """As the records show them."""
-        return [s.initial_states for s in self.segments]
+        return [s.initial_states(self.plant) for s in self.segments]
 
     def residuals(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
         """(S, m) per record: measured − simulated over the noise, the priors of the initial states appended."""
@@ -105,7 +105,7 @@ class Shooting:
         segments = self.segments[i]
         run = self._run(plant, segments, states)
         simulated = np.stack([run[c] for c in segments.channels], axis=-1) / segments.noise_std
-        off = (segments.initial_states - states)[:, segments.free] / segments.prior_std
+        off = (self.initial_states[i] - states)[:, segments.free] / segments.prior_std
         off = np.where(segments.unmeasured_pressures, self.misfit * off, off)
         return np.concatenate(((segments.measured - simulated).reshape(len(segments), -1), off), axis=1)
 

@@ -91,9 +91,9 @@ def as_record(name: str, run: Trajectory, dt: float, channels: Sequence[str], sp
     return Record.sampled(name, dt, {"drive": run.drive, **found})
 
 
-def segments(record: Record, plant: Plant, length: float, noise: Mapping[str, float]) -> Segments:
+def segments(record: Record, kind: str, length: float, noise: Mapping[str, float]) -> Segments:
     """The record in segments, to be judged by the ``noise`` of its channels (the record itself has none)."""
-    (found,) = cut([record], plant, length)
+    (found,) = cut([record], kind, length)
     return found.with_noise(np.array([noise[c] for c in found.channels]))
 
 
@@ -105,10 +105,8 @@ def evidence(
     :raises SimulationError: a model cannot follow.
     """
     linear, columns = [], []
-    cuts = segments(record, points[0].plant, length, noise)
+    cuts = segments(record, points[0].model.kind, length, noise)
     for point in points:
-        if point.plant.state_names != points[0].plant.state_names:  # effects of their own bring states of their own
-            cuts = segments(record, point.plant, length, noise)
         shooting = Shooting(point.plant, [cuts])
         projections = shooting.projections(point.plant, shooting.initial_states)
         at = FitPoint(shooting, point.parameters, shooting.initial_states, projections)

@@ -99,7 +99,7 @@ def refits(
 
     def fitted(number: int, record: Record, keys: Sequence[str]) -> Fit:
         point = points[number]
-        cuts = [segments(record, point.plant, length, noise)]
+        cuts = [segments(record, point.model.kind, length, noise)]
         return fit_segments(point.plant, cuts, keys, FitSettings(length=length, most_steps=_MOST_STEPS))
 
     own = {t: fitted(t, records[t], ()).cost for t in {t for t, _ in chosen}}

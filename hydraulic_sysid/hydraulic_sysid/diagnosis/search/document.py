@@ -196,15 +196,6 @@ def _parameters(model: Model, known: Mapping[str, Known], keys: Sequence[str]) -
 
 
 def _curve(c: NonparametricCurve) -> dict[str, Any]:
-    return {
-        "place": c.place,
-        "subsystem": c.subsystem,
-        "summary": c.summary,
-        "variable": c.variable,
-        "unit": c.unit,
-        "explained_share": c.share,
-        "knots": c.knots,
-        "value": c.value,
-        "low": c.value - c.error,
-        "high": c.value + c.error,
-    }
+    same = ("place", "subsystem", "summary", "variable", "unit", "knots", "value")
+    band = {"explained_share": c.share, "low": c.value - c.error, "high": c.value + c.error}
+    return {name: getattr(c, name) for name in same} | band

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_sim.arrays import Index, Mask
-from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.segments import Segments, cut
 
@@ -42,12 +41,12 @@ class Split:
         return list(dict.fromkeys(c for s in self.segments for c in s.channels))
 
 
-def split(records: Sequence[Record], validation: Sequence[Record], plant: Plant, length: float) -> Split:
+def split(records: Sequence[Record], validation: Sequence[Record], kind: str, length: float) -> Split:
     """Cut ``records`` and those for ``validation`` into segments of ``length`` seconds.
 
     :raises hydraulic_sysid.estimation.errors.SegmentError: a record cannot be cut.
     """
-    segments = cut(records, plant, length) + cut(validation, plant, length)
+    segments = cut(records, kind, length) + cut(validation, kind, length)
     if validation:
         return Split(segments, [np.full(len(s), i < len(records)) for i, s in enumerate(segments)])
     # Shifted from record to record, so that not always the same phase of an experiment is for validation.
