@@ -252,22 +252,30 @@ class Bench:
 
     def _take(self, stamp_ns: int, frame: bytes) -> PlantSample:
         found = self.frames.quantities()
-        for fault, text in self.measuring.problems(stamp_ns, found):
+        # By the SYNC itself: where the loop was held up, that is later than the instant it was due.
+        for fault, text in self.measuring.problems(self.frames.sync_ns, found):
             self.faults.report(fault, text)
         return self.measuring.sample(stamp_ns, self._codec.decode(frame)["drive"], found)
 
     def _cycles_until(self, done: Callable[[], bool], patience: float) -> None:
-        """Cycles of its own at 0 V, before the loop begins and after it has ended."""
-        end = due = time.monotonic()
-        end += max(patience, _LOCKSTEP_S) if self._lockstep else patience
-        while not done() and due < end:
+        """Cycles of its own at 0 V, before the loop begins and after it has ended.
+
+        In lockstep patience counts periods, and the time that is waited for devices which do not answer.
+        """
+        due, spent = time.monotonic(), 0.0
+        while not done() and spent < patience:
+            begun = time.monotonic()
             complete, frame = self._exchange(0.0, self.beat.next_sync())
             with self._changed:
                 self._hear_valve()
                 if complete:
                     self._take(self.frames.sync_ns, frame)
+            if self._lockstep:
+                spent += self._period if complete else max(time.monotonic() - begun, self._period)
+                continue
             due = max(due + self._period, time.monotonic() - self._period)
             time.sleep(max(due - time.monotonic(), 0.0))
+            spent += time.monotonic() - begun
 
     def _ready(self) -> bool:
         if self.machine.arrived and self.machine.goal is State.INIT:

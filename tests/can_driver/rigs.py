@@ -1,13 +1,21 @@
-"""The driver and virtual devices on a bus of their own, in this process."""
+"""The driver and virtual devices on a bus of their own, in this process, in lockstep.
+
+Nothing in it depends on how busy the machine is: a frame is heard by the other side before `send` returns, one SYNC is
+one period of both sides' time, and an answer that is not there then does not come.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 import threading
 import time
 from dataclasses import replace
 from typing import Any
+
+import can
+import canopen
 
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus import Address, Bus, SdoWrite
@@ -16,6 +24,9 @@ from hydraulic_can_driver.can_bus import open_can
 from hydraulic_can_driver.cia408 import State
 from hydraulic_can_driver.virtual import Reading, VirtualBench
 from hydraulic_interfaces.errors import HydraulicError
+
+NO_ANSWER_S = 0.02  # an answer is there when the question has been sent
+PAUSE_S = 0.001  # between cycles, for the other threads
 
 _channels = itertools.count()
 
@@ -40,6 +51,16 @@ class Integrator:
         return now
 
 
+def connect_at_once(line: can.BusABC, network: canopen.Network) -> None:
+    """Let frames for `line` be heard where they are sent, in the thread that sends them."""
+
+    def hear(message: can.Message, block: bool = True, timeout: float | None = None) -> None:
+        for listener in network.listeners:
+            listener(message)
+
+    line.queue.put = hear  # type: ignore[attr-defined]
+
+
 class Rig:
     """The driver and virtual devices on a bus of their own, in this process."""
 
@@ -47,10 +68,21 @@ class Rig:
         self.bus = replace(bus, channel=f"rig {next(_channels)}")
         self.plant = Integrator()
         self._line = open_can(self.bus.interface, self.bus.channel)
-        self.devices = VirtualBench(self.bus, self._line, self.plant)
+        self.devices = VirtualBench(self.bus, self._line, self.plant, lockstep=True)
         self.devices.start()
-        self.bench = Bench(self.bus)
+        connect_at_once(self._line, self.devices.network)
+        self.bench = self.driver()
         self.loop: Loop | None = None
+
+    def driver(self) -> Bench:
+        """A driver on the bus, not yet booted."""
+        bench = Bench(self.bus, lockstep=True)
+        connect_at_once(bench.master.can, bench.master._network)
+        bench.master._patience(NO_ANSWER_S, 1)
+        bench.master._patience = lambda *_: None  # type: ignore[method-assign]
+        wait = bench.frames.wait
+        bench.frames.wait = lambda until: wait(0.0)  # type: ignore[method-assign]
+        return bench
 
     def run(self) -> Loop:
         """Boot, start, and cycle from now on."""
@@ -81,6 +113,16 @@ class Rig:
         assert self.loop is not None
         self.loop.drive = drive
 
+    def idle(self, seconds: float) -> None:
+        """Let time pass for the devices without a SYNC, as after the end of a driver."""
+        devices = self.devices
+        with devices._lock:
+            for _ in range(math.ceil(seconds * self.bus.rate)):
+                devices._clock.sync(0.0)
+                devices._period()
+                devices._watch()
+                devices._settle()
+
     def close(self) -> None:
         """Whatever state it is in."""
         if self.loop is not None:
@@ -104,14 +146,13 @@ class Loop(threading.Thread):
         self.hold.set()
 
     def run(self) -> None:
-        period = 1.0 / self.bench.bus.rate
         while not self.ending:
-            sample = self.bench.cycle(time.time_ns(), self.drive)
+            sample = self.bench.cycle(self.bench.beat.next_sync(), self.drive)
             if sample is not None:
                 self.samples.append(sample)
             self.first.set()
             self.hold.wait()
-            time.sleep(period)
+            time.sleep(PAUSE_S)
 
     def end(self) -> None:
         """Stop, as the plant loop does at its end."""

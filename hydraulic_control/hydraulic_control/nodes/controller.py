@@ -11,7 +11,6 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 
@@ -105,10 +104,9 @@ class ControllerNode(Served, LifecycleNode):
             self._diagnostics.publish(self._health.message(self._state, self.get_clock().now().nanoseconds))
 
     def close(self) -> None:
-        """0 V if it was in command, and time for the message to leave."""
+        """0 V if it was in command."""
         if self._state == "active":
             self.on_deactivate(None)  # type: ignore[arg-type]
-            self._command.wait_for_all_acked(Duration(seconds=1))
 
     def _on_state(self, message: JointState) -> None:
         if self._state != "active":

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 
 from hydraulic_control.errors import ControlError
@@ -64,10 +63,6 @@ class ReferenceNode(ServedNode):
         if self._run is not None:
             self._finish(f"broken off: {name}", failed=True)
         self.over = True
-
-    def close(self) -> None:
-        """Let the last message arrive before the publisher goes."""
-        self._reference.wait_for_all_acked(Duration(seconds=1))
 
     def _make(self) -> ReferenceRun:
         v = self._table

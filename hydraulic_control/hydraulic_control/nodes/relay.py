@@ -13,7 +13,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 
 from hydraulic_control.relay import SPECS, Relay, RelaySettings
@@ -67,10 +66,9 @@ class RelayNode(ServedNode):
         self._relay.abort(f"interrupted by {name}")
 
     def close(self) -> None:
-        """0 V, and time for the message to leave."""
+        """0 V at the end."""
         if self._stamp_ns is not None:
             self._command.publish(self._encode(self._stamp_ns, 0.0))
-            self._command.wait_for_all_acked(Duration(seconds=1))
 
     def _on_state(self, message: JointState) -> None:
         sample = understood(self, "state", sample_from_messages, message)

@@ -12,7 +12,6 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -77,10 +76,6 @@ class ExcitationNode(ServedNode):
         self._leaving = True
         self._session.stop(f"interrupted by {name}")
         self.over = not self._session.busy
-
-    def close(self) -> None:
-        """Let the last word of the experiment arrive: what got lost is repeated after 3 s (heartbeat of Fast DDS)."""
-        self._experiment.wait_for_all_acked(Duration(seconds=4))
 
     def _arm(self, plan: Plan, patience: float) -> None:
         self._patience_ends = time.monotonic() + patience

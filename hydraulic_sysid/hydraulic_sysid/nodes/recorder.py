@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
-from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -26,8 +25,8 @@ from std_msgs.msg import String
 from hydraulic_interfaces.contract import NAMESPACE, RECORDER_NODE
 from hydraulic_interfaces.qos import profile
 from hydraulic_node_utils.nodes import command_line
-from hydraulic_node_utils.nodes.exit_guard import exit_guard
 from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.nodes.taking_down import take_down
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_sysid.data.bag import Recording, StopRule
 from hydraulic_sysid.nodes._recorder_health import RecorderHealth
@@ -43,7 +42,6 @@ PARAMETERS = (
 _POLL_S = 0.02
 _STATUS_S = 0.05
 _DIAGNOSTICS_S = 1.0
-_ACKNOWLEDGE_S = 1.0
 
 
 class Recorder(Node):
@@ -101,7 +99,6 @@ class Recorder(Node):
             figures = {"messages": bag.messages, "duration_s": bag.duration_ns * 1e-9, "bytes": bag.size}
             self._tell("closed", reason=reason, missing=missing, **figures)
             self.get_logger().info(f"closed {folder}: {sum(bag.messages.values())} messages ({reason})")
-        self._status.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGE_S))
 
     def _is_due(self, period: float) -> bool:
         if due := time.monotonic() >= self._due[period]:
@@ -134,10 +131,7 @@ def main(argv: list[str] | None = None) -> int:
         executor.spin_once(timeout_sec=_POLL_S)
         node.poll()
     node.close("signal")
-    with exit_guard(code := int(node.state == "failed")):
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown()
+    take_down(node, executor, code := int(node.state == "failed"))
     return code
 
 

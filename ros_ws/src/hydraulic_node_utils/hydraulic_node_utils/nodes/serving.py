@@ -14,7 +14,7 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from hydraulic_node_utils.nodes import command_line
-from hydraulic_node_utils.nodes.exit_guard import exit_guard
+from hydraulic_node_utils.nodes.taking_down import take_down
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 WATCH_PERIOD_S = 0.05
@@ -34,7 +34,7 @@ class Served:
         self.over = True
 
     def close(self) -> None:
-        """Called last, while publishers still work."""
+        """Called last, while publishers still work; what it publishes arrives."""
 
 
 class ServedNode(Served, Node):
@@ -71,11 +71,7 @@ def serve(
             node.watch()
     finally:
         node.close()
-        with exit_guard(node.exit_code):
-            executor.remove_node(node)
-            executor.shutdown()
-            node.destroy_node()
-            rclpy.try_shutdown()
+        take_down(node, executor, node.exit_code)
     return node.exit_code
 
 

@@ -14,7 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from hydraulic_node_utils.nodes import command_line
-from hydraulic_node_utils.nodes.exit_guard import exit_guard
+from hydraulic_node_utils.nodes.taking_down import take_down
 from hydraulic_plant_node.nodes.plant_node import PlantNode, parameters_of
 from hydraulic_plant_node.plant_backend import PlantBackend
 
@@ -27,7 +27,7 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     """Run the plant node over `backend` until SIGINT or SIGTERM; exit code 0, 1, or 2 for bad options.
 
     Three threads: this one waits for a signal, one serves ROS, the plant loop runs in its own. A signal leads
-    through the lifecycle's shutdown while everything still works, so the last thing the plant sees is 0 V.
+    through the lifecycle's shutdown while everything still works, so the last thing the plant sees, and tells, is 0 V.
     Where that is not possible, because the thread that serves ROS or the plant loop does not return, the code is 1.
     """
     parser = command_line.parser(description, parameters_of(backend))
@@ -62,10 +62,7 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     if not ended:
         print(_end(ended), file=sys.stderr)
     code = 0 if ended else 1
-    with exit_guard(code):
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown()
+    take_down(node, executor, code)
     return code
 
 
