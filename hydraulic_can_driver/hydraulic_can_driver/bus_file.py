@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
@@ -40,6 +41,7 @@ SHIPPED = Path(__file__).parent / "buses"
 _IDENTITY = ("vendor", "product", "revision", "serial")
 _MAX_SYNCHRONOUS = 240  # transmission types 1 ... 240: with every n-th SYNC (CiA 301, 7.5.2.36)
 _MISSING = object()
+T = TypeVar("T")
 
 
 def shipped() -> list[str]:
@@ -72,18 +74,16 @@ def load_bus(name: str | Path) -> Bus:
         channel=str(top.take("channel", object)),
         bitrate=top.take("bitrate", int, 1_000_000, 10_000, 1_000_000),
         rate=top.take("rate", float, 500.0, 1.0, 1000.0),
-        master=_master(top.section("master")),
-        cylinder=_cylinder(top.section("cylinder")),
-        limits=_limits(top.section("limits")),
-        monitoring=_monitoring(top.section("monitoring")),
+        master=top.read("master", _master),
+        cylinder=top.read("cylinder", _cylinder),
+        limits=top.read("limits", _limits),
+        monitoring=top.read("monitoring", _monitoring),
         nodes={},
         path=path,
     )
     nodes = top.section("nodes")
-    entries = {key: (nodes.section(key), _node(key, nodes.section(key))) for key in nodes.names()}
-    nodes.done()
+    bus = replace(bus, nodes={name: nodes.read(name, partial(_node, name)) for name in nodes.names()})
     top.done()
-    bus = replace(bus, nodes={name: node for name, (_, node) in entries.items()})
     _check(bus, nodes)
     check_against_eds(bus)
     return bus
@@ -133,13 +133,23 @@ class _Section:
         """The mapping under a key."""
         return _Section(self._path, self.take(key, object, {} if optional else _MISSING), f"{self._where}, {key}")
 
-    def rows(self, key: str) -> Iterator[_Section]:
-        """The mappings of the list under a key; none if there is no such key."""
+    def read(self, key: str, build: Callable[[_Section], T]) -> T:
+        """What `build` makes of the mapping under a key, all of which it has to read."""
+        return self.section(key).built(build)
+
+    def rows(self, key: str, build: Callable[[_Section], T]) -> tuple[T, ...]:
+        """The same of each mapping of the list under a key; none if there is no such key."""
         rows = self.take(key, object, [])
         if not isinstance(rows, list):
             raise self.fail(key, f"{key}: expected a list, found {rows!r}")
-        for number, row in enumerate(rows, 1):
-            yield _Section(self._path, row, f"{self._where}, {key} {number}")
+        places = ((row, f"{self._where}, {key} {number}") for number, row in enumerate(rows, 1))
+        return tuple(_Section(self._path, row, where).built(build) for row, where in places)
+
+    def built(self, build: Callable[[_Section], T]) -> T:
+        """What `build` makes of this mapping."""
+        found = build(self)
+        self.done()
+        return found
 
     def done(self) -> None:
         """Refuse what nobody has read."""
@@ -160,21 +170,18 @@ def _master(at: _Section) -> Master:
             "lost_after",
             f"lost_after is {found.lost_after:g} s; expected at least two heartbeats of {found.heartbeat:g} s",
         )
-    at.done()
     return found
 
 
 def _cylinder(at: _Section) -> Cylinder:
-    found = Cylinder(*(at.take(key, float, math.nan, 0.0, 10.0) for key in ("area_a", "area_b")))
-    at.done()
-    return found
+    return Cylinder(*(at.take(key, float, math.nan, 0.0, 10.0) for key in ("area_a", "area_b")))
 
 
 def _limits(at: _Section) -> Limits:
     position = at.take("position", list)
     if len(position) != 2 or not all(isinstance(x, int | float) for x in position) or not position[0] < position[1]:
         raise at.fail("position", f"position is {list(position)!r}; expected [lowest, highest], m")
-    found = Limits(
+    return Limits(
         at.take("drive", float, 10.0, 1e-3, 10.0),
         (float(position[0]), float(position[1])),
         at.take("position_margin", float, low=0.0),
@@ -183,20 +190,16 @@ def _limits(at: _Section) -> Limits:
         at.take("frozen_spool", float, low=0.0, high=1.0),
         at.take("frozen_supply", float, low=0.0),
     )
-    at.done()
-    return found
 
 
 def _monitoring(at: _Section) -> Monitoring:
-    found = Monitoring(
+    return Monitoring(
         at.take("frames_within", float, low=0.1, high=0.95),
         at.take("missed_cycles", int, low=1, high=1000),
         at.take("sync_gap", float, low=0.002, high=10.0),
         at.take("state_change", float, low=0.01, high=60.0),
         at.take("heartbeats", int, 3, 2, 100),
     )
-    at.done()
-    return found
 
 
 def _node(name: str, at: _Section) -> Node:
@@ -208,10 +211,10 @@ def _node(name: str, at: _Section) -> Node:
         eds=at.take("eds", str, ""),
         identity={key: identity.take(key, int, low=0, high=0xFFFFFFFF) for key in identity.names()},
         heartbeat=at.take("heartbeat", float, 0.0, 0.0, 60.0),
-        boot=tuple(_write(row) for row in at.rows("boot")),
-        receive=tuple(_pdo(row, SENT) for row in at.rows("receive")),
-        transmit=tuple(_pdo(row, [n for n in SIGNALS if n not in SENT]) for row in at.rows("transmit")),
-        inspect=tuple(_reading(row) for row in at.rows("inspect")),
+        boot=at.rows("boot", _write),
+        receive=at.rows("receive", partial(_pdo, SENT)),
+        transmit=at.rows("transmit", partial(_pdo, [name for name in SIGNALS if name not in SENT])),
+        inspect=at.rows("inspect", _reading),
     )
     for key in found.identity:
         if key not in _IDENTITY:
@@ -220,7 +223,6 @@ def _node(name: str, at: _Section) -> Node:
     for reading in found.inspect:
         if reading.switch and reading.switch not in names:
             raise at.fail("inspect", f"{reading.name}: switch {reading.switch!r} is none of {', '.join(names)}")
-    at.done()
     return found
 
 
@@ -251,13 +253,11 @@ def _write(at: _Section) -> SdoWrite:
     address = _address(at)
     kind: type = float if address.type == "f32" else int
     low, high = raw_range(address.type)
-    found = SdoWrite(address, at.take("value", kind, low=low, high=high), at.take("comment", str, ""))
-    at.done()
-    return found
+    return SdoWrite(address, at.take("value", kind, low=low, high=high), at.take("comment", str, ""))
 
 
 def _reading(at: _Section) -> Reading:
-    found = Reading(
+    return Reading(
         at.take("name", str),
         _address(at),
         _scale(at),
@@ -265,25 +265,22 @@ def _reading(at: _Section) -> Reading:
         at.take("effect", str, ""),
         at.take("switch", str, ""),
     )
-    at.done()
-    return found
 
 
-def _pdo(at: _Section, allowed: Any) -> Pdo:
+def _pdo(allowed: Sequence[str], at: _Section) -> Pdo:
     found = Pdo(
         number=at.take("number", int, low=1, high=512),
         cob_id=at.take("cob_id", int, low=0x181, high=0x57F),
         transmission=at.take("transmission", int, 1, 1, 255),
-        signals=tuple(_signal(row, allowed) for row in at.rows("map")),
+        signals=at.rows("map", partial(_signal, allowed)),
         timeout=at.take("timeout", float, 0.0, 0.0, 60.0),
     )
     if not 1 <= found.length <= 8:
         raise at.fail("map", f"map has {found.length} bytes; a frame carries 1 ... 8")
-    at.done()
     return found
 
 
-def _signal(at: _Section, allowed: Any) -> Signal:
+def _signal(allowed: Sequence[str], at: _Section) -> Signal:
     name = at.take("signal", str)
     if name not in allowed:
         raise at.fail("signal", f"signal is {name!r}; allowed here: {', '.join(allowed)}")
@@ -295,7 +292,6 @@ def _signal(at: _Section, allowed: Any) -> Signal:
         raise at.fail("bits", f"bits are {sorted(named)}; expected {sorted(SWITCHES)}")
     if not SIGNALS[name] and address.type[0] != "u":
         raise at.fail("type", f"{name} is of type {address.type}; expected one without sign")
-    at.done()
     return found
 
 

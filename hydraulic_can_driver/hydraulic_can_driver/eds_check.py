@@ -31,7 +31,7 @@ def eds_file(bus: Bus, node: Node) -> Path:
     :raises BusFileError: there is none of that name.
     """
     for folder in (bus.path.parent, FOLDER):
-        if (folder / node.eds).is_file():
+        if node.eds and (folder / node.eds).is_file():
             return folder / node.eds
     raise BusFileError(f"{bus.path}: {node.name}: no EDS file {node.eds!r}, neither beside it nor in {FOLDER}")
 

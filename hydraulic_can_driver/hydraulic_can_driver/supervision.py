@@ -12,21 +12,21 @@ from hydraulic_can_driver.receiver import STATES, Receiver
 LATE = 0.25
 """A SYNC that is off its instant by more than this share of the period is late, and counted."""
 
-# Bits of a frame with n bytes of data and an 11-bit identifier, with interframe space, and the share of stuff bits
-# that is typical; at most it is 1 in 5 of the 34 + 8 n bits that are stuffed.
-_FRAME_BITS, _STUFFED_BITS, _TYPICAL_STUFFING = 47, 34, 0.1
+_TYPICAL_STUFFING = 0.1  # share of the bits that are stuffed; at most it is 1 in 4
 
 
-def bus_load(bus: Bus) -> float:
-    """Share of the bit rate that the cyclic frames take: SYNC, drive, the devices' frames, heartbeats."""
+def frame_bits(length: int, worst: bool = True) -> float:
+    """Bits of a frame with an 11-bit identifier and ``length`` bytes: with stuff bits and pause (ISO 11898-1)."""
+    stuffed = 34 + 8 * length
+    return 8 * length + 47 + ((stuffed - 1) // 4 if worst else _TYPICAL_STUFFING * stuffed)
+
+
+def bus_load(bus: Bus, worst: bool = False) -> float:
+    """Share of the bit rate that SYNC, process data and heartbeats take: typical, or the largest possible."""
     pdos = [pdo.length for node in bus.nodes.values() for pdo in (*node.receive, *node.transmit)]
-    per_second = bus.rate * sum(map(_bits, [0, *pdos])) + _bits(1) / bus.master.heartbeat
-    per_second += sum(_bits(1) / node.heartbeat for node in bus.nodes.values() if node.heartbeat)
-    return per_second / bus.bitrate
-
-
-def _bits(length: int) -> float:
-    return _FRAME_BITS + 8 * length + _TYPICAL_STUFFING * (_STUFFED_BITS + 8 * length)
+    per_second = bus.rate * sum(frame_bits(length, worst) for length in (0, *pdos))
+    beats = [bus.master.heartbeat, *(node.heartbeat for node in bus.nodes.values())]
+    return (per_second + sum(frame_bits(1, worst) / beat for beat in beats if beat > 0.0)) / bus.bitrate
 
 
 class Supervision:

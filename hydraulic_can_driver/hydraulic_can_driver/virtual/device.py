@@ -16,6 +16,7 @@ import canopen
 from canopen.nmt import NMT_STATES
 
 from hydraulic_can_driver.bus import Node
+from hydraulic_can_driver.eds_check import eds_file
 from hydraulic_can_driver.errors import CodecError
 from hydraulic_can_driver.virtual.objects import Objects
 from hydraulic_can_driver.virtual.pdo import check_write
@@ -25,6 +26,8 @@ from hydraulic_can_driver.virtual.wiring import Event, Wiring
 
 RESET_NODE, RESET_COMMUNICATION = 129, 130
 NMT_CODES = {name: code for code, name in NMT_STATES.items()}
+SENSOR_FAULT = 0x5000
+"""EMCY: device hardware."""
 _HEARTBEAT = 0x700
 _HISTORY = 8
 
@@ -63,7 +66,7 @@ class Device:
         self.node: canopen.LocalNode | None = None
         self.stored: dict[tuple[int, int], int] = {}  # settings that survive a loss of power
         self.pdos = ProcessData(self, wiring.network, wiring.lock, lambda number: self._say("rpdo", str(number)))
-        self.objects = Objects(canopen.import_od(str(wiring.eds(spec)), spec.id))
+        self.objects = Objects(canopen.import_od(str(eds_file(wiring.bus, spec)), spec.id))
         self._connected = False
         self._beat_period = 0.0
         self._next_beat = 0.0
@@ -313,3 +316,23 @@ class Device:
 
     def _say(self, kind: str, detail: str) -> None:
         self.wiring.tell(Event(kind, self.name, detail))
+
+
+class Sensor(Device):
+    """A device whose sensor has a cable."""
+
+    def __init__(self, spec: Node, wiring: Wiring) -> None:
+        super().__init__(spec, wiring)
+        self._broken = False
+
+    @property
+    def broken(self) -> bool:
+        """Whether its cable is broken."""
+        return self._broken
+
+    @broken.setter
+    def broken(self, on: bool) -> None:
+        if on == self._broken:
+            return
+        self._broken = on
+        self.emergency(SENSOR_FAULT if on else 0, 0x81 if on else 0)

@@ -5,22 +5,28 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import inf
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, TypeVar
 
 import can
 import canopen
 
-from hydraulic_can_driver.virtual.device import Device
+from hydraulic_can_driver.virtual.device import Device, Sensor
 from hydraulic_can_driver.virtual.lvdt import ABOVE, BELOW, Lvdt
-from hydraulic_can_driver.virtual.transducer import Transducer
 from hydraulic_can_driver.virtual.valve import Valve
 
 BUS_OFF_FRAME = 0x40  # class of an error frame of SocketCAN: the controller has left the bus (linux/can/error.h)
 _LOW_SUPPLY, _LOW_SUPPLY_REGISTER = 0x3412, 0x04
 _VALVE_CABLE, _VALVE_REGISTER = 0x5001, 0x80
+
+
+FAULTS: dict[str, type[InjectedFault]] = {}
+"""All of them, by the names that a command line uses: those of the classes, "pdo_length"."""
+
+AnyDevice = TypeVar("AnyDevice", bound=Device)
 
 
 class FaultyBench(Protocol):
@@ -37,12 +43,33 @@ class InjectedFault(ABC):
     node: str
     profiles: ClassVar[tuple[int, ...]] = ()
 
+    def __init_subclass__(cls) -> None:
+        if not cls.__name__.startswith("_"):
+            FAULTS[re.sub(r"\B(?=[A-Z])", "_", cls.__name__).lower()] = cls
+
     @abstractmethod
     def begin(self, bench: FaultyBench) -> None:
         """It happens."""
 
     def end(self, bench: FaultyBench) -> None:  # noqa: B027 - what happens only once has nothing to end
         """It is over."""
+
+
+class _Switch(InjectedFault):
+    """One attribute of a device, or of its upsets, has the value of the fault's own field (else True) until the end."""
+
+    attribute: ClassVar[str]
+    off: ClassVar[object]
+
+    def begin(self, bench: FaultyBench) -> None:
+        self._set(bench, next((value for name, value in vars(self).items() if name != "node"), True))
+
+    def end(self, bench: FaultyBench) -> None:
+        self._set(bench, self.off)
+
+    def _set(self, bench: FaultyBench, value: object) -> None:
+        device = _device(bench, self.node, Lvdt) if self.profiles else bench.devices[self.node]
+        setattr(device.upsets if hasattr(device.upsets, self.attribute) else device, self.attribute, value)
 
 
 @dataclass(frozen=True)
@@ -79,90 +106,60 @@ class StatusFault(InjectedFault):
     register: int = _LOW_SUPPLY_REGISTER
 
     def begin(self, bench: FaultyBench) -> None:
-        _valve(bench, self.node).fail(f"fault 0x{self.code:04X}", self.code, self.register, lasts=True)
+        _device(bench, self.node, Valve).fail(f"fault 0x{self.code:04X}", self.code, self.register, lasts=True)
 
     def end(self, bench: FaultyBench) -> None:
-        _valve(bench, self.node).recover(f"fault 0x{self.code:04X}")
+        _device(bench, self.node, Valve).recover(f"fault 0x{self.code:04X}")
 
 
 @dataclass(frozen=True)
-class MissingPdo(InjectedFault):
+class MissingPdo(_Switch):
     """The next ``frames`` process data frames are not sent; all until the end by default."""
 
+    attribute, off = "lost_frames", 0.0
     frames: float = inf
 
-    def begin(self, bench: FaultyBench) -> None:
-        bench.devices[self.node].upsets.lost_frames = self.frames
-
-    def end(self, bench: FaultyBench) -> None:
-        bench.devices[self.node].upsets.lost_frames = 0.0
-
 
 @dataclass(frozen=True)
-class LatePdo(InjectedFault):
+class LatePdo(_Switch):
     """Process data come ``delay`` [s] after their SYNC."""
 
+    attribute, off = "delay", 0.0
     delay: float = 0.005
 
-    def begin(self, bench: FaultyBench) -> None:
-        bench.devices[self.node].upsets.delay = self.delay
-
-    def end(self, bench: FaultyBench) -> None:
-        bench.devices[self.node].upsets.delay = 0.0
-
 
 @dataclass(frozen=True)
-class PdoLength(InjectedFault):
+class PdoLength(_Switch):
     """Process data frames have ``length`` bytes, whatever is mapped."""
 
+    attribute, off = "length", None
     length: int = 3
-
-    def begin(self, bench: FaultyBench) -> None:
-        bench.devices[self.node].upsets.length = self.length
-
-    def end(self, bench: FaultyBench) -> None:
-        bench.devices[self.node].upsets.length = None
 
 
 @dataclass(frozen=True)
-class PositionJump(InjectedFault):
+class PositionJump(_Switch):
     """The LVDT reads ``by`` [m] too much."""
 
+    attribute, off = "jump", 0.0
     profiles = (406,)
     by: float = 0.05
 
-    def begin(self, bench: FaultyBench) -> None:
-        _lvdt(bench, self.node).jump = self.by
-
-    def end(self, bench: FaultyBench) -> None:
-        _lvdt(bench, self.node).jump = 0.0
-
 
 @dataclass(frozen=True)
-class PositionFrozen(InjectedFault):
+class PositionFrozen(_Switch):
     """The LVDT repeats its last position."""
 
+    attribute, off = "frozen", False
     profiles = (406,)
-
-    def begin(self, bench: FaultyBench) -> None:
-        _lvdt(bench, self.node).frozen = True
-
-    def end(self, bench: FaultyBench) -> None:
-        _lvdt(bench, self.node).frozen = False
 
 
 @dataclass(frozen=True)
-class PositionStuck(InjectedFault):
+class PositionStuck(_Switch):
     """The LVDT reads the position ``at`` [m]; by default one outside of any stroke."""
 
+    attribute, off = "stuck_at", None
     profiles = (406,)
     at: float = 5.0
-
-    def begin(self, bench: FaultyBench) -> None:
-        _lvdt(bench, self.node).stuck_at = self.at
-
-    def end(self, bench: FaultyBench) -> None:
-        _lvdt(bench, self.node).stuck_at = None
 
 
 @dataclass(frozen=True)
@@ -173,10 +170,10 @@ class LimitSwitch(InjectedFault):
     side: str = "extended"
 
     def begin(self, bench: FaultyBench) -> None:
-        _lvdt(bench, self.node).area = ABOVE if self.side == "extended" else BELOW
+        _device(bench, self.node, Lvdt).area = ABOVE if self.side == "extended" else BELOW
 
     def end(self, bench: FaultyBench) -> None:
-        _lvdt(bench, self.node).area = 0
+        _device(bench, self.node, Lvdt).area = 0
 
 
 @dataclass(frozen=True)
@@ -187,14 +184,14 @@ class CableBreak(InjectedFault):
         device = bench.devices[self.node]
         if isinstance(device, Valve):
             device.fail("cable break", _VALVE_CABLE, _VALVE_REGISTER, lasts=True)
-        elif isinstance(device, Lvdt | Transducer):
+        elif isinstance(device, Sensor):
             device.broken = True
 
     def end(self, bench: FaultyBench) -> None:
         device = bench.devices[self.node]
         if isinstance(device, Valve):
             device.recover("cable break")
-        elif isinstance(device, Lvdt | Transducer):
+        elif isinstance(device, Sensor):
             device.broken = False
 
 
@@ -265,40 +262,10 @@ class BusOff(InjectedFault):
             bench.network.bus.send(frame)
 
 
-FAULTS: dict[str, type[InjectedFault]] = {
-    "heartbeat_stop": HeartbeatStop,
-    "emergency": Emergency,
-    "status_fault": StatusFault,
-    "missing_pdo": MissingPdo,
-    "late_pdo": LatePdo,
-    "pdo_length": PdoLength,
-    "position_jump": PositionJump,
-    "position_frozen": PositionFrozen,
-    "position_stuck": PositionStuck,
-    "limit_switch": LimitSwitch,
-    "cable_break": CableBreak,
-    "wrong_identity": WrongIdentity,
-    "sdo_abort": SdoAbort,
-    "power_cut": PowerCut,
-    "unplugged": Unplugged,
-    "bus_off": BusOff,
-}
-"""All of them, by the names that a command line uses."""
-
-
-def _valve(bench: FaultyBench, name: str) -> Valve:
+def _device(bench: FaultyBench, name: str, kind: type[AnyDevice]) -> AnyDevice:
     device = bench.devices[name]
-    if not isinstance(device, Valve):
-        raise ValueError(f"{name} is no valve; profiles are {_profiles(bench)}")
+    if not isinstance(device, kind):
+        wanted = "LVDT" if kind is Lvdt else "valve"
+        profiles = {name: device.spec.profile for name, device in bench.devices.items()}
+        raise ValueError(f"{name} is no {wanted}; profiles are {profiles}")
     return device
-
-
-def _lvdt(bench: FaultyBench, name: str) -> Lvdt:
-    device = bench.devices[name]
-    if not isinstance(device, Lvdt):
-        raise ValueError(f"{name} is no LVDT; profiles are {_profiles(bench)}")
-    return device
-
-
-def _profiles(bench: FaultyBench) -> dict[str, int]:
-    return {name: device.spec.profile for name, device in bench.devices.items()}

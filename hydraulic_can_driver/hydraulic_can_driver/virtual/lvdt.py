@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from hydraulic_can_driver.bus import Node
-from hydraulic_can_driver.virtual.device import Device
+from hydraulic_can_driver.virtual.device import Sensor
 from hydraulic_can_driver.virtual.plant import Reading
 from hydraulic_can_driver.virtual.wiring import Wiring
 
@@ -15,13 +15,10 @@ ABOVE, BELOW = 0x2, 0x4
 POSITION_ERROR = 0x1
 """Bit of the alarms 0x6503."""
 
-SENSOR_FAULT = 0x5000
-"""EMCY: device hardware."""
-
 _POSITION_STEP, _SPEED_STEP = 1e-9, 1e-5  # 0x6005 counts 0.001 um and 0.01 mm/s
 
 
-class Lvdt(Device):
+class Lvdt(Sensor):
     """Measures the piston. `jump` [m], `frozen`, `stuck_at` [m], `broken` and `area` (bits of 0x6400) are faults."""
 
     profile = 406
@@ -32,20 +29,7 @@ class Lvdt(Device):
         self.frozen = False
         self.stuck_at: float | None = None
         self.area = 0
-        self._broken = False
         self._sign, self._zero = wiring.mounting("position")
-
-    @property
-    def broken(self) -> bool:
-        """Whether its cable is broken."""
-        return self._broken
-
-    @broken.setter
-    def broken(self, on: bool) -> None:
-        if on == self._broken:
-            return
-        self._broken = on
-        self.emergency(SENSOR_FAULT if on else 0, 0x81 if on else 0)
 
     def sense(self, reading: Reading) -> None:
         """See `Device.sense`."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from hydraulic_can_driver.bus import Node
-from hydraulic_can_driver.virtual.device import Device
+from hydraulic_can_driver.virtual.device import Sensor
 from hydraulic_can_driver.virtual.plant import Reading
 from hydraulic_can_driver.virtual.wiring import Wiring
 
@@ -16,11 +16,10 @@ UNITS: Mapping[int, float] = {0x00220000: 1.0, 0x004E0000: 1e5}
 INVALID, OVERLOAD, UNDERLOAD = 0x1, 0x2, 0x4
 """Bits of the status 0x6150."""
 
-SENSOR_FAULT = 0x5000
 _LEAST_CURRENT, _SPAN_CURRENT = 4000, 16000  # uA: 4 ... 20 mA
 
 
-class Transducer(Device):
+class Transducer(Sensor):
     """Measures the pressure that the bus file reads from it; `broken` is its cable."""
 
     profile = 404
@@ -30,19 +29,6 @@ class Transducer(Device):
         names = [signal.name for pdo in spec.transmit for signal in pdo.signals]
         self.quantity = next(name for name in names if name in ("pressure_a", "pressure_b", "pressure_supply"))
         self._sign, self._offset = wiring.mounting(self.quantity)
-        self._broken = False
-
-    @property
-    def broken(self) -> bool:
-        """Whether its cable is broken."""
-        return self._broken
-
-    @broken.setter
-    def broken(self, on: bool) -> None:
-        if on == self._broken:
-            return
-        self._broken = on
-        self.emergency(SENSOR_FAULT if on else 0, 0x81 if on else 0)
 
     def sense(self, reading: Reading) -> None:
         """See `Device.sense`; a pressure that the plant does not have reads as a broken cable."""

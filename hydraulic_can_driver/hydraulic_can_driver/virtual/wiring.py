@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from threading import RLock
 
 import canopen
 
-from hydraulic_can_driver.bus import Bus, Node, Signal
-from hydraulic_can_driver.errors import BusFileError
-
-EDS_FOLDER = Path(__file__).parents[1] / "eds"
+from hydraulic_can_driver.bus import Bus, Signal
 
 
 @dataclass(frozen=True)
@@ -43,19 +39,6 @@ class Wiring:
     tell: Callable[[Event], None]
     settle: Callable[[], None]
     now: Callable[[], float]
-
-    def eds(self, node: Node) -> Path:
-        """The EDS file of a node: beside the bus file, or one of those that come with the package.
-
-        :raises BusFileError: there is no such file.
-        """
-        for folder in (self.bus.path.parent, EDS_FOLDER):
-            if node.eds and (folder / node.eds).is_file():
-                return folder / node.eds
-        raise BusFileError(
-            f"{self.bus.path}: node {node.name}: no EDS file {node.eds!r} beside it or in {EDS_FOLDER}; "
-            "a virtual device needs one"
-        )
 
     def mounting(self, name: str) -> tuple[float, float]:
         """How a quantity meets the device that measures or makes it: its sign and its offset, from the bus file.
