@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from hydraulic_sysid.data.records import read_records
-from hydraulic_sysid.diagnosis.grey_box.valve_actuator import fit_valve_actuator
 from hydraulic_sysid.estimation import metrics
 from hydraulic_sysid.linear.identification import IdentificationSettings, identify
 from hydraulic_sysid.linear.models import (
@@ -29,6 +28,7 @@ from hydraulic_sysid.linear.models import (
     best,
     try_orders,
 )  # fmt: skip
+from valve_actuator import fit_valve_actuator
 
 # As quoted in the literature for this split; not computed here.
 QUOTED = {"wavelet network": 0.579, "sigmoid network": 0.467, "recurrent network": 0.328}

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from hydraulic_sysid.data.records import read_records
-from hydraulic_sysid.diagnosis.grey_box.valve_actuator import fit_valve_actuator
 from hydraulic_sysid.estimation import metrics
 from hydraulic_sysid.linear.identification import IdentificationSettings, identify
 from hydraulic_sysid.linear.models import Arx, ArxOrder, StateSpace, TransferFunction
+from valve_actuator import fit_valve_actuator
 
 DATASETS = Path(os.environ.get("HYDRAULIC_DATASETS", "/nowhere"))
 pytestmark = pytest.mark.skipif(

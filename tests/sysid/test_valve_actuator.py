@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hydraulic_sysid.diagnosis.grey_box.valve_actuator import fit_valve_actuator
 from hydraulic_sysid.estimation import metrics
 from hydraulic_sysid.linear.models import IdentificationError, fit_transfer_function
 from hydraulic_sysid.linear.models.transfer_function import TransferFunctionOrder
+from valve_actuator import fit_valve_actuator
 
 SUPPLY, COUPLING, LEAKAGE, DAMPING = 3.0, 0.06, 0.02, 0.12
 
