@@ -4,8 +4,6 @@ They are compiled for each library of effects once per process (about a second),
 they call may have changed since.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -11,8 +11,6 @@ The derivative acts on the measurement, so that a step of the reference is not d
 makes enabling and changes of gains bumpless; it decays. Records are those of `parameters.RECORD` and `STATE`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -137,10 +137,6 @@ class Effect:
             found["dynamics"] = self.dynamics
         return found
 
-    def null_values(self) -> dict[str, float]:
-        """Parameter values at which the effect contributes exactly nothing."""
-        return {p.name: p.default if p.null is None else p.null for p in self.parameters}
-
 
 def arguments(function: Callable) -> tuple[str, ...]:
     """The argument names of a kernel, in order."""

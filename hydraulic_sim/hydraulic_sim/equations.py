@@ -4,8 +4,6 @@
 right-hand side for other solvers. ``{name}`` is a place that `compose` fills, mostly with the effects of a slot.
 """
 
-from __future__ import annotations
-
 RHS = """
 t = now
 position = S[0]; velocity = S[1]; pressure_a = S[2]; pressure_b = S[3]; stick = S[{stick}]

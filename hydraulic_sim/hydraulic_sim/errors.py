@@ -1,7 +1,5 @@
 """The errors this package raises; each message says what, where, the value and what is allowed."""
 
-from __future__ import annotations
-
 from hydraulic_interfaces.errors import HydraulicError
 
 

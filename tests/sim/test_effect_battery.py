@@ -57,8 +57,9 @@ DRIVES = {"sweep": sweep(0.3, 1.0, 40.0, 8.0), "steps": steps(0.3, 0.0, 5.0, -10
 
 @pytest.mark.parametrize("effect", SWITCHED, ids=ids(SWITCHED))
 def test_the_null_value_contributes_exactly_nothing(effect: Effect, bare: Model, everything: Model) -> None:
+    values = {p.name: p.default if p.null is None else p.null for p in effect.parameters}
     for background in (bare, everything.without_effect(effect.name)):
-        without, null = Plant(background), Plant(background.with_effect(effect.name, effect.null_values()))
+        without, null = Plant(background), Plant(background.with_effect(effect.name, values))
         for name, drive in DRIVES.items():
             start = without.initial_state(position=-0.1, velocity=0.02)
             assert same(null.simulate(drive, DT, start), without.simulate(drive, DT, start)), name

@@ -1,7 +1,5 @@
 """What can be set on the reference node: the trajectory, its limits, and when it starts and ends."""
 
-from __future__ import annotations
-
 from hydraulic_control.trajectories import KINDS
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 

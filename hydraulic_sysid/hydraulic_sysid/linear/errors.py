@@ -1,7 +1,5 @@
 """What records cannot give."""
 
-from __future__ import annotations
-
 from hydraulic_interfaces.errors import HydraulicError
 
 

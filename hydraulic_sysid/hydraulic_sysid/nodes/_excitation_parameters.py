@@ -1,7 +1,5 @@
 """The parameters of the excitation node."""
 
-from __future__ import annotations
-
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_sysid.excitation import shipped_plans
 

@@ -85,8 +85,6 @@ SERVICES: tuple[Service, ...] = (
     Service("reset", "std_srvs/srv/Trigger", "releases the latched stop; the actuator stays disabled until enable"),
 )
 
-QOS_CLASSES: tuple[str, ...] = ("stream", "latched", "diagnostics")
-
 _TOPICS = {entry.name.removeprefix("/"): entry for entry in TOPICS}
 _SERVICES = {entry.name: entry for entry in SERVICES}
 

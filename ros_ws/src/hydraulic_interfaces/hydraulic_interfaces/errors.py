@@ -1,7 +1,5 @@
 """The root of every error that is up to the user's input, files or bench, and not to the program."""
 
-from __future__ import annotations
-
 
 class HydraulicError(Exception):
     """Its text says what is wrong, where, with which value, and what is allowed; a command line prints it and ends."""

@@ -4,8 +4,6 @@ Z. Nisar, H. Munawar, "System Identification and Controller Design for Hydraulic
 literature" and "Model selection criteria", and what its text draws from a figure of RMSE without values.
 """
 
-from __future__ import annotations
-
 BEST_FIT = {"multisine": 99.17, "chirp": 98.79}
 MSE = {"multisine": 0.002918, "chirp": 0.00301}
 FPE = {"multisine": 0.00304, "chirp": 0.00311}
