@@ -5,7 +5,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "hydraulic_sysid"
-DATA = ("css", "csv", "csv.gz", "eds", "html", "j2", "js", "json", "yaml")  # files installed beside the modules
+DATA = ("css", "csv", "csv.gz", "eds", "html", "j2", "js", "json", "xml", "yaml")  # files installed beside the modules
 
 
 def executables() -> list[str]:

@@ -19,6 +19,9 @@ PATIENCE_S = 60.0
 # Fast DDS drops an answer when it has not yet found the asking client after 100 ms, which a loaded machine exceeds.
 ASK_AGAIN_S = 3.0
 
+# Several tests run at once, and matrices are small: threads of the linear algebra would only spin.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Started with `nohup … &`, this process and with it all that it starts would ignore SIGINT, which tests send.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -88,6 +91,59 @@ class Process:
         self.popen.wait()
 
 
+LONGEST = (
+    "hidden_effects/test_diagnosis.py",
+    "system/test_demo.py",
+    "system/test_demo_can.py",
+    "system/test_paper.py",
+    "sysid/test_next_experiment.py",
+    "hidden_effects/test_benches.py",
+    "sysid/test_locate.py",
+    "hidden_effects/test_emps.py",
+    "bringup/test_paper.py",
+    "contract/test_plant_contract.py",
+    "control/test_nodes.py",
+    "sysid/test_order_selection.py",
+    "sim/test_user_effect_example.py",
+    "sim/test_user_effects.py",
+    "plant_node/test_plant_node.py",
+    "sysid/test_excitation_node.py",
+    "sysid/test_recorder_node.py",
+)
+"""Files whose tests come first, so that no processor waits for another at the end."""
+
+ONE_BY_ONE = {
+    "contract/test_plant_contract.py",
+    "control/test_nodes.py",
+    "hidden_effects/test_diagnosis.py",
+    "plant_node/test_plant_node.py",
+    "sim/test_user_effects.py",
+    "sysid/test_excitation_node.py",
+    "sysid/test_locate.py",
+    "sysid/test_recorder_node.py",
+}
+"""Files whose tests share nothing that takes long to make: each goes to the processor that is free."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest."""
+    rank = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0].removeprefix("tests/"), len(rank)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """The tests of a file go to one worker, but for those that are independent of each other."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Scheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return nodeid if file.removeprefix("tests/") in ONE_BY_ONE else file
+
+    return Scheduling(config, log)
+
+
 @pytest.fixture(name="wait_until", scope="session")
 def wait_until_fixture() -> Callable[..., Any]:
     """`wait_until(condition, what, patience)`: the first true value of `condition`, or a failed test."""
@@ -97,10 +153,13 @@ def wait_until_fixture() -> Callable[..., Any]:
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """A ROS domain of this test's own, on this machine only, in the environment of it and of its children."""
+    from hydraulic_node_utils.nodes import middleware
+
     domain_coordinator = pytest.importorskip("domain_coordinator")
     with domain_coordinator.domain_id() as number:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        for name, value in middleware.VARIABLES.items():
+            monkeypatch.setenv(name, value)
         monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
         monkeypatch.setenv("PYTHONUNBUFFERED", "1")
         yield number

@@ -133,10 +133,10 @@ def _digest(content: bytes) -> str:
 def _executed(path: Path, source: bytes) -> Effect:
     """The effect that ``source`` defines.
 
-    The text itself is executed, as the import system may take an edit within the same second for no edit.
+    The text itself is executed, as the import system may take an edit within the same second for no edit. Its module is
+    named after the text: compiled code, which is kept by the text and not by the place of the file, refers to the name.
     """
-    place = _digest(str(path).encode())[:12]
-    module = ModuleType(f"hydraulic_sim_user_effect_{place}_{path.stem}")
+    module = ModuleType(f"hydraulic_sim_user_effect_{_digest(source)[:12]}_{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module
     try:

@@ -368,16 +368,13 @@ def test_failed_build_says_which_why_and_what_to_do_and_is_tried_again(checkout:
 
 
 def test_all_tests_run_those_of_the_wall_clock_last_and_the_closing_line_sums_up(built: FakeCheckout) -> None:
-    for name in ("control", "sim", "system"):
-        (built.root / "tests" / name).mkdir(parents=True)
-        (built.root / "tests" / name / "test_it.py").touch()
     answer = built.bench("test")
     assert answer.returncode == 0, answer.stderr
     calls = [re.sub(r"-o cache_dir=\S+ | -n \d+", "", call) for call in built.calls()]
     assert calls == [
         "-m ruff check .",
         "-m mypy",
-        "-m pytest -m not timing -p xdist --dist=loadfile --no-loadscope-reorder tests/system tests/control tests/sim",
+        "-m pytest -m not timing -p xdist --dist=loadfile --no-loadscope-reorder tests",
         "-m pytest -m timing tests",
     ]
     assert answer.stdout.count("collected 2 items") == 2

@@ -3,7 +3,7 @@
 from setuptools import find_packages, setup
 
 NAME = "hydraulic_interfaces"
-DATA = ("csv", "csv.gz", "css", "eds", "html", "js", "json", "yaml")  # files installed beside the modules
+DATA = ("csv", "csv.gz", "css", "eds", "html", "js", "json", "xml", "yaml")  # files installed beside the modules
 
 setup(
     name=NAME,

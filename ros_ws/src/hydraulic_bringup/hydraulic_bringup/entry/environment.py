@@ -27,6 +27,7 @@ def command_variables(checkout: Checkout, ros: Ros, environ: Mapping[str, str]) 
     modules = [prefix / "lib" / version / "site-packages" for prefix in installed for version in versions]
     result["PYTHONPATH"] = joined(filter(Path.is_dir, modules), environ.get("PYTHONPATH", ""))
     result.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    result.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads only spin: matrices are small
     if not ros.prefix:
         result.update(wheel_variables(checkout.venv, environ))
     return {name: value for name, value in result.items() if value or name in environ}

@@ -10,7 +10,7 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from hydraulic_node_utils.nodes.discovery import stay_local
+from hydraulic_node_utils.nodes import middleware
 from hydraulic_node_utils.nodes.log_callers import know_log_callers
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
@@ -32,7 +32,7 @@ def start(options: argparse.ArgumentParser, argv: list[str] | None) -> argparse.
     Leaves with exit code 2 for options that do not exist or are malformed.
     """
     arguments = sys.argv if argv is None else [sys.argv[0], *argv]
-    stay_local()
+    middleware.set_up()
     try:
         given = options.parse_args(remove_ros_args(arguments)[1:])
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

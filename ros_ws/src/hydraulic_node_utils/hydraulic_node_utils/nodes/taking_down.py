@@ -12,8 +12,9 @@ from rclpy.node import Node
 from hydraulic_node_utils.nodes.exit_guard import exit_guard
 
 DELIVERY_S = 4.0
-"""Patience with subscribers: a packet that got lost is sent again with the next heartbeat of Fast DDS, after 3 s. While
-one is missing, those after it are not handed over, and never are once their publisher has gone."""
+"""Patience with subscribers. A packet that got lost is sent again after the next heartbeat of Fast DDS: 50 ms later
+(`middleware`), or 3 s by default. While one is missing, those after it are not handed over; nor are they once the
+publisher has gone."""
 
 
 def take_down(node: Node, executor: Executor, code: int) -> None:

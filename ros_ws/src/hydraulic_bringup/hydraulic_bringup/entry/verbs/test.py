@@ -24,7 +24,6 @@ from ..bench import Bench
 
 ORDER = 2
 CHECKS = ("ruff", "check", "."), ("mypy",)
-LONGEST = ("hidden_effects", "system", "contract")  # folders; first, so that no processor waits at the end
 FAILED_TESTS = 1  # pytest's exit code; others mean that it was not able to run them
 INTERRUPT_S = 15.0  # for pytest to end its node processes and to sum up
 COUNT = re.compile(r"(\d+) (passed|failed|errors?|skipped|xfailed|xpassed|repeated|warnings?)\b")
@@ -49,13 +48,10 @@ def run(bench: Bench, arguments: list[str]) -> int:
     begun = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="bench_test_") as memory:
         pytest = [*python, "pytest", "-o", f"cache_dir={memory}", "-m"]
-        # Named one by one: a folder beside one of its own is sorted in.
-        names = {file.parent.name for file in root.glob("tests/*/test_*.py")}
-        every = [f"tests/{name}" for name in sorted(names, key=lambda name: (name not in LONGEST, name))]
         workers = len(os.sched_getaffinity(0)) + 1  # one more than processors: some always wait for nodes
         spread = ["-p", "xdist", "-n", str(workers), "--dist=loadfile", "--no-loadscope-reorder"]
         runs = [
-            Pytest([*pytest, "not timing", *spread, *every], root, variables),
+            Pytest([*pytest, "not timing", *spread, "tests"], root, variables),
             Pytest([*pytest, "timing", "tests"], root, variables),
         ]
         if runs[-1].code == FAILED_TESTS:
