@@ -22,6 +22,7 @@ PLANTS: dict[str, tuple[str, ...]] = {
     "integrator": (str(HERE.parent / "plant_node" / "integrator_plant.py"),),
     "sim": ("hydraulic_sim.nodes.simulator",),
 }
+RATE = ("-p", "rate:=250.0")  # low, so that the collecting test process keeps up on a busy machine
 # Long enough for a source in a loaded test process not to be taken for silent.
 PATIENT = ("-p", "watchdog:=2.0")
 PLANT = "/actuator/plant"
@@ -34,7 +35,7 @@ def start(request: pytest.FixtureRequest, launch: Any, compiled_physics: None) -
 
     def run(*ros: str, autostart: bool = True, lockstep: bool = False) -> Any:
         options = [name for name, on in (("--autostart", autostart), ("--lockstep", lockstep)) if on]
-        return launch(target, *arguments, *options, "--ros-args", *ros)
+        return launch(target, *arguments, *options, "--ros-args", *RATE, *ros)
 
     return run
 
