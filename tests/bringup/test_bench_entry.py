@@ -20,7 +20,7 @@ from hydraulic_bringup.entry.ros import Ros
 
 ROOT = Path(__file__).resolve().parents[2]
 ENTRY = Path("ros_ws/src/hydraulic_bringup/hydraulic_bringup")
-PATIENCE_S = 30.0
+PATIENCE_S = 150.0
 
 # Stands for the interpreter of the environment: writes down how it was called, and does colcon's work.
 FAKE_PYTHON = """#!/bin/sh

@@ -16,7 +16,7 @@ from hydraulic_can_driver.virtual import Reading, VirtualBench
 SYNC, NMT = 0x80, 0x000
 VALVE, LVDT, PRESSURE_A = 0x10, 0x20, 0x30
 DRIVE, STATUS, POSITION, PRESSURE = 0x510, 0x490, 0x1A0, 0x1B0
-PATIENCE_S = 20.0
+PATIENCE_S = 150.0
 
 _channels = itertools.count()
 

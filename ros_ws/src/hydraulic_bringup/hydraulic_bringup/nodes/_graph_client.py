@@ -10,7 +10,7 @@ from typing import Any
 
 import rclpy
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
@@ -20,7 +20,9 @@ from hydraulic_interfaces.qos import profile
 from hydraulic_node_utils.nodes.exit_guard import exit_guard
 
 _POLL_S = 0.1
-
+# Fast DDS drops an answer where it has not found the asking client after 100 ms, which a busy machine exceeds.
+_ASK_AGAIN_S = 5.0
+_GOALS = {"configure": "inactive", "activate": "active", "deactivate": "inactive", "cleanup": "unconfigured"}
 
 _LEFT: list[GraphClient] = []
 
@@ -84,7 +86,12 @@ class GraphClient:
         """
         request = ChangeState.Request()
         request.transition = Transition(id=getattr(Transition, f"TRANSITION_{label.upper()}"))
-        answer = self._call(ChangeState, f"{absolute(PLANT_NODE)}/change_state", request, patience, meanwhile)
+        plant, begun = absolute(PLANT_NODE), time.monotonic()
+        answer = self._call(ChangeState, f"{plant}/change_state", request, patience, meanwhile)
+        if answer is not None and not answer.success and time.monotonic() - begun > _ASK_AGAIN_S:
+            # Where the first answer got lost, the second says that the transition is no longer possible.
+            state = self._call(GetState, f"{plant}/get_state", GetState.Request(), patience, meanwhile)
+            return state is not None and state.current_state.label == _GOALS[label]
         return answer is not None and bool(answer.success)
 
     def enable(self, patience: float) -> str:
@@ -104,19 +111,23 @@ class GraphClient:
     def _call(
         self, kind: Any, name: str, request: Any, patience: float, meanwhile: Callable[[], None] = lambda: None
     ) -> Any:
+        """The first answer; asked again where none comes, so the second question must do no harm."""
         client = self._node.create_client(kind, name)
         self._executor.wake()
-        deadline = time.monotonic() + patience
+        asked, deadline = 0.0, time.monotonic() + patience
         try:
             while not client.wait_for_service(timeout_sec=_POLL_S):
                 meanwhile()
                 if time.monotonic() > deadline:
                     return None
-            future = client.call_async(request)
-            self._executor.wake()
-            while not future.done() and time.monotonic() < deadline:
+            futures: list[Any] = []
+            while not any(future.done() for future in futures) and (now := time.monotonic()) < deadline:
+                if not futures or now - asked > _ASK_AGAIN_S:
+                    asked = now
+                    futures.append(client.call_async(request))
+                    self._executor.wake()
                 meanwhile()
                 time.sleep(0.01)
-            return future.result() if future.done() else None
+            return next((future.result() for future in futures if future.done()), None)
         finally:
             self._node.destroy_client(client)
