@@ -84,7 +84,7 @@ def festo(folder: Path) -> None:
         for structure in (Arx(ArxOrder(3, 3, 1)), Arx(ArxOrder(3, 3, 1), True), TransferFunction(), StateSpace()):
             settings = IdentificationSettings(structure=structure, sampling_time=dt, input=drive, output=output)
             try:
-                held = identify(records, settings=settings)["test"]
+                held = identify(records, settings=settings)[0]["test"]
             except IdentificationError as error:
                 print(f"    {structure.text:40s} {error}")
                 continue

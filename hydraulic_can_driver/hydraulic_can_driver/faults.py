@@ -58,12 +58,6 @@ class FaultLatch:
         with self._lock:
             return "; ".join(self._latched.values())
 
-    @property
-    def latched(self) -> set[BusFault]:
-        """All kinds that are latched."""
-        with self._lock:
-            return set(self._latched)
-
     def __contains__(self, fault: BusFault) -> bool:
         return fault in self._latched
 

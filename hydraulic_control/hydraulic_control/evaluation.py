@@ -58,13 +58,14 @@ def evaluate(
     """Rows for every plant and reference; ``bench`` holds recorded responses with their kinds."""
     cases = [(f"identified {m.name}", c) for m, c in zip(models, identified(models), strict=True)]
     cases.append(("nonlinear", nominal(model, noise)))
+    common = settings_for(step)
     rows = [
         row(name, kind, respond(values, case, kind, settings))
         for name, case in cases
-        for kind, settings in settings_for(step).items()
+        for kind, settings in common.items()
     ]
     rows += [row("bench", kind, response) for kind, response in bench]
-    quiet = row("nonlinear, no sensor noise", "step", respond(values, nominal(model, QUIET), "step", _step(step)))
+    quiet = row("nonlinear, no sensor noise", "step", respond(values, nominal(model, QUIET), "step", common["step"]))
     return {"values": dict(values), "rows": rows, "agreement": [_agree(m.name, rows, quiet) for m in models]}
 
 
@@ -95,10 +96,6 @@ def better_than_paper(document: Mapping[str, Any], name: str) -> bool | None:
         return None
     ours = next(r for r in document["rows"] if r["where"] == "nonlinear" and r["reference"] == "step")
     return not ours["runs_away"] and all(ours[key] <= limit for key, limit in printed[1]._asdict().items())
-
-
-def _step(step: float) -> dict[str, Any]:
-    return settings_for(step)["step"]
 
 
 def _agree(name: str, rows: Sequence[Mapping[str, Any]], nonlinear: Mapping[str, Any]) -> dict[str, Any]:

@@ -23,11 +23,6 @@ def grid(highest: float = _HIGHEST) -> NDArray[np.float64]:
     return np.asarray(np.geomspace(_LOWEST, min(highest, _HIGHEST), _POINTS), dtype=float)
 
 
-def plant_response(model: Model, omega: NDArray[np.float64]) -> Complex:
-    """Drive [V] to position [m] of the model linearised at rest in mid stroke, dry friction left out, (N,)."""
-    return np.asarray(linearise(model)[0, 0](1j * omega), dtype=complex)
-
-
 def critical_point(omega: NDArray[np.float64], response: Complex, delay: float = LOOP_DELAY_S) -> CriticalPoint | None:
     """The least gain at which a proportional loop oscillates; None where the phase does not cross −180° on the grid."""
     loop = control.frd(response * np.exp(-1j * omega * delay), omega)
@@ -40,9 +35,9 @@ def critical_point(omega: NDArray[np.float64], response: Complex, delay: float =
 
 
 def critical_of_model(model: Model) -> CriticalPoint | None:
-    """Of the linearised plant in a loop at 1 kHz."""
+    """Of the plant linearised at rest in mid stroke, dry friction left out, in a loop at 1 kHz."""
     omega = grid()
-    return critical_point(omega, plant_response(model, omega))
+    return critical_point(omega, np.asarray(linearise(model)[0, 0](1j * omega), dtype=complex))
 
 
 def critical_of_identified(model: IdentifiedModel) -> CriticalPoint | None:

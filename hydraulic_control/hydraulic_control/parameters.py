@@ -64,11 +64,6 @@ LAW: tuple[ParameterSpec, ...] = (
 SPECS = {spec.name: spec for spec in LAW}
 
 
-def default_values() -> dict[str, Any]:
-    """Every parameter at its default."""
-    return {spec.name: spec.default for spec in LAW}
-
-
 def check(name: str, value: Any) -> Any:
     """`value` of the parameter of that name, in its type.
 
@@ -81,7 +76,7 @@ def check(name: str, value: Any) -> Any:
 
 def complete(values: Mapping[str, Any]) -> dict[str, Any]:
     """All parameters: `values` where given and found acceptable (`check`), else defaults."""
-    return default_values() | {name: check(name, value) for name, value in values.items()}
+    return {spec.name: spec.default for spec in LAW} | {name: check(name, value) for name, value in values.items()}
 
 
 def as_number(name: str, value: Any) -> float:

@@ -56,6 +56,7 @@ SPECS = (
     ParameterSpec("time_limit", RelaySettings.time_limit, "that breaks it off", "s", 0.1, 600.0),
 )
 
+
 @dataclass(frozen=True)
 class CriticalPoint:
     """Gain [V/m] at which the loop oscillates, and the period [s] of that oscillation."""

@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from hydraulic_control.errors import ControlError
 from hydraulic_control.relay import CriticalPoint
@@ -16,15 +16,11 @@ from hydraulic_control.relay import CriticalPoint
 
 @dataclass(frozen=True)
 class Gains:
-    """Kp [V/m], Ki [V/(m·s)] and Kd [V·s/m]."""
+    """Kp [V/m], Ki [V/(m·s)] and Kd [V·s/m], named as the parameters of the controller."""
 
     kp: float
     ki: float
     kd: float
-
-    def as_values(self) -> dict[str, float]:
-        """As parameters of the controller."""
-        return asdict(self)
 
 
 def _from_times(kp: float, integral_time: float, derivative_time: float) -> Gains:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hydraulic_control import rules
@@ -141,5 +141,5 @@ def starts(
     # Polynomials take what is fed forward for a disturbance and fight it.
     common["velocity_feedforward"] = 1.0 / simple[0]
     if law == "pid":
-        return [common | g.as_values() for g in gains.values()]
-    return [common | _shaped(g.as_values(), shape) for g in gains.values() for shape in SHAPES]
+        return [common | asdict(g) for g in gains.values()]
+    return [common | _shaped(asdict(g), shape) for g in gains.values() for shape in SHAPES]

@@ -67,23 +67,20 @@ def linearise(model: Model, position: float = 0.0, drive: float = 0.0) -> contro
     """
     plant, active = _smooth_plant(model)
     point = operating_point(model, position, drive)
-    names = list(active)
+    names, places = list(active), list(active.values())
     a = np.empty((len(names), len(names)))
-    for j, index in enumerate(active.values()):
+    for j, index in enumerate(places):
         h = _FRACTION * list(plant.layout.state_records.values())[index].scale
         up, down = point.state.copy(), point.state.copy()
         up[index] += h
         down[index] -= h
         difference = plant.derivative(up, drive)[0] - plant.derivative(down, drive)[0]
-        a[:, j] = difference[list(active.values())] / (2.0 * h)
+        a[:, j] = difference[places] / (2.0 * h)
     h = 1e-4 * plant.value("drive_limit")
-    b = (plant.derivative(point.state, drive + h)[0] - plant.derivative(point.state, drive - h)[0])[
-        list(active.values())
-    ] / (2.0 * h)
+    difference = plant.derivative(point.state, drive + h)[0] - plant.derivative(point.state, drive - h)[0]
+    b = difference[places] / (2.0 * h)
     outputs = [n for n in ("position", "pressure_a", "pressure_b") if n in names]
-    c = np.zeros((len(outputs), len(names)))
-    for i, name in enumerate(outputs):
-        c[i, names.index(name)] = 1.0
+    c = np.eye(len(names))[[names.index(name) for name in outputs]]
     return control.ss(
         a, b[:, None], c, np.zeros((len(outputs), 1)), states=names, inputs=["drive"], outputs=outputs, name=model.name
     )

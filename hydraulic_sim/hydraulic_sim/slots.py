@@ -27,11 +27,6 @@ class Slot:
     per_sample: bool = False
     hydraulic: bool = False
 
-    @property
-    def signal(self) -> str:
-        """A chain's or a law's own signal."""
-        return self.returns[0]
-
 
 SLOTS: dict[str, Slot] = {
     s.name: s

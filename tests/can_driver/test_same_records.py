@@ -25,7 +25,7 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.resampling import held_average
 from hydraulic_sysid.estimation.metrics import best_fit
 from hydraulic_sysid.excitation import load_plan
-from hydraulic_sysid.linear.identification import IdentificationSettings, identify_model
+from hydraulic_sysid.linear.identification import IdentificationSettings, identify
 from hydraulic_sysid.linear.models import Arx, ArxOrder
 
 RATE, SECONDS = 500.0, 12.0
@@ -85,7 +85,7 @@ def over_can(patient: Bus) -> Iterator[Record]:
 
 def test_the_same_model_comes_out(simulated: Record, over_can: Record) -> None:
     settings = IdentificationSettings(structure=Arx(ArxOrder(3, 3, 1)), sampling_time=DT)
-    models: dict[str, Any] = {r.name: identify_model([r], settings=settings)[1] for r in (simulated, over_can)}
+    models: dict[str, Any] = {r.name: identify([r], settings=settings)[1] for r in (simulated, over_can)}
     for data in (simulated, over_can):
         u = held_average(data["drive"], data.dt, DT)
         runs = {name: model.simulate(u, np.zeros(u.size)) for name, model in models.items()}

@@ -10,6 +10,7 @@ import pytest
 
 from hydraulic_interfaces.contract import ABORTED, FINISHED, STARTED
 from hydraulic_sysid.data.bag import experiment
+from hydraulic_sysid.data.bag.types import typestore
 from hydraulic_sysid.excitation import Plan, session
 from hydraulic_sysid.excitation.run import ExcitationRun
 from hydraulic_sysid.excitation.signals.steps import Steps
@@ -18,12 +19,13 @@ PLAN = Plan("any", Steps([2.0], 1.0), 0.3)
 
 
 @pytest.mark.parametrize("end", [FINISHED, ABORTED])
-def test_the_recorder_understands_the_events_of_a_run(end: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(experiment, "string_data", lambda data: data.decode())
+def test_the_recorder_understands_the_events_of_a_run(end: str) -> None:
+    kind_of_text, store = "std_msgs/msg/String", typestore()
     log, run = experiment.ExperimentLog(), ExcitationRun(PLAN)
     for kind, stamp in ((STARTED, 10), (end, 20)):
         assert not log.ended
-        log.take(session.experiment_event(kind, run, 10, stamp).encode())
+        message = store.types[kind_of_text](session.experiment_event(kind, run, 10, stamp))
+        log.take(bytes(store.serialize_cdr(message, kind_of_text)))
     assert (log.ended, log.outcome, log.end_ns) == (True, end, 20)
     assert [json.loads(text)["event"] for text in log.custom_data().values()] == [STARTED, end]
 

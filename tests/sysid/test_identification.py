@@ -30,7 +30,7 @@ def plant(n: int, seed: int, noise: float) -> Record:
 
 def test_final_prediction_error_foresees_the_error_on_test_data() -> None:
     settings = IdentificationSettings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT, holdout=0.5)
-    result = identify([plant(8000, 1, 0.02)], settings=settings)
+    result, _ = identify([plant(8000, 1, 0.02)], settings=settings)
     assert result["test"]["mse_one_step"] == pytest.approx(result["test"]["fpe"], rel=0.1)
     assert result["test"]["fpe"] == pytest.approx(0.02**2, rel=0.1)
     tests = result["test"]["records"][0]["residual_tests"]
@@ -40,7 +40,7 @@ def test_final_prediction_error_foresees_the_error_on_test_data() -> None:
 
 def test_too_low_an_order_fails_the_residual_tests() -> None:
     settings = IdentificationSettings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT, holdout=0.5)
-    tests = identify([plant(8000, 2, 0.02)], settings=settings)["test"]["records"][0]["residual_tests"]
+    tests = identify([plant(8000, 2, 0.02)], settings=settings)[0]["test"]["records"][0]["residual_tests"]
     assert np.mean(np.abs(tests["autocorrelation"][1:]) > tests["bound"]) > 0.3
 
 
@@ -48,7 +48,7 @@ def test_the_test_part_has_no_say_in_the_fit() -> None:
     first = plant(1000, 3, 0.02)
     spoilt = np.concatenate((first["position"][:800], np.random.default_rng(0).standard_normal(200)))
     settings = IdentificationSettings(Arx(ArxOrder(2, 2, 1)), sampling_time=DT)
-    clean, dirty = (identify([r], settings=settings) for r in (first, record_of(spoilt, first["drive"])))
+    clean, dirty = (identify([r], settings=settings)[0] for r in (first, record_of(spoilt, first["drive"])))
     assert clean["model"]["coefficients"] == dirty["model"]["coefficients"]
     assert dirty["test"]["best_fit_free_run"] < 50.0 < clean["test"]["best_fit_free_run"]
 
@@ -56,7 +56,7 @@ def test_the_test_part_has_no_say_in_the_fit() -> None:
 def test_unstable_model_is_called_unstable() -> None:
     u = np.random.default_rng(4).standard_normal(1500)
     y = lfilter([0.0, 1.0], [1.0, -1.05], u)
-    result = identify([record_of(y, u)], settings=IdentificationSettings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT))
+    result, _ = identify([record_of(y, u)], settings=IdentificationSettings(Arx(ArxOrder(1, 1, 1)), sampling_time=DT))
     assert result["verdict"]["level"] == "off"
     assert "unstable (pole at |z| = 1.05)" in result["verdict"]["text"]
     assert np.isnan(result["test"]["best_fit_free_run"])

@@ -40,8 +40,7 @@ def test_the_crane_of_the_literature() -> None:
 def test_the_training_bench_in_free_run_and_one_step(file, columns, output, structure, free_run: float) -> None:
     """The last fifth, which the fit has not seen; one step ahead says little of a slow record, free run much."""
     records = read_records(DATASETS / "mataveid_festo_hydraulics" / file, columns)
-    held = identify(records, settings=IdentificationSettings(structure=structure, sampling_time=0.1, output=output))[
-        "test"
-    ]
+    settings = IdentificationSettings(structure=structure, sampling_time=0.1, output=output)
+    held = identify(records, settings=settings)[0]["test"]
     assert held["best_fit_free_run"] > free_run
     assert held["best_fit_one_step"] > 95.0

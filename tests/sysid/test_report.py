@@ -31,7 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run's folder with both results of two sample records."""
     run = tmp_path_factory.mktemp("run")
     records = read_all([SAMPLE / "triangle.csv.gz", SAMPLE / "steps.csv.gz"])
-    results.write_result(run, identify(records))
+    results.write_result(run, identify(records)[0])
     results.write_result(run, compare(load_model("sample_bench"), records))
     write_page(run, results.read_folder(run))
     return run

@@ -21,7 +21,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.metrics import best_fit
 from hydraulic_sysid.excitation.signals.random_phase_multisine import RandomPhaseMultisine
-from hydraulic_sysid.linear.identification import IdentificationSettings, identify_model
+from hydraulic_sysid.linear.identification import IdentificationSettings, identify
 
 RATE, SECONDS = 500.0, 16.0
 MODEL = load_model(Path(str(resources.files("hydraulic_bringup.demo") / "models" / "as_built.yaml")))
@@ -91,8 +91,8 @@ def test_drive_and_position_differ_by_counts(records: tuple[Record, Record]) -> 
 def test_identified_models_agree(records: tuple[Record, Record]) -> None:
     sim, over = records
     settings = IdentificationSettings(sampling_time=0.01)
-    _, model_sim = identify_model([sim], None, settings)
-    _, model_can = identify_model([over], None, settings)
+    _, model_sim = identify([sim], None, settings)
+    _, model_can = identify([over], None, settings)
     step = round(settings.sampling_time * RATE)
     drive = sim["drive"][: sim["drive"].size // step * step].reshape(-1, step).mean(axis=1)
     start = sim["position"][::step][: drive.size]

@@ -12,12 +12,11 @@ from contextlib import closing
 from dataclasses import replace
 
 from rich.console import Console
-from rich.table import Table
 
 from hydraulic_can_driver import readback
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus_file import load_bus, shipped
-from hydraulic_node_utils import cli
+from hydraulic_node_utils import cli, tables
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -45,9 +44,8 @@ def _inspect(options: argparse.Namespace) -> None:
 
 
 def _show(found: dict) -> None:
-    table = Table(title=f"settings of the devices on {found['bus']}")
-    for column in ("device", "setting", "object", "value", "neutral", "looks like"):
-        table.add_column(column)
+    columns = ("device", "setting", "object", "value", "neutral", "looks like")
+    table = tables.table(f"settings of the devices on {found['bus']}", columns)
     for name, device in found["devices"].items():
         for row in device["settings"]:
             neutral = "" if row["neutral"] is None else f"{row['neutral']:g} {row['unit']}"

@@ -54,6 +54,19 @@ class Profile:
         return cls(**{f.name: known[f.name] for f in fields(cls)})  # type: ignore[return-value]
 
 
+def ramped(now: float, total: float, distance: float, speed: float, acceleration: float) -> tuple[float, float]:
+    """Way [m] and speed [m/s] at ``now`` [s] of a way that takes ``total`` [s] from rest to rest.
+
+    It goes at ``speed`` between ramps of constant ``acceleration``.
+    """
+    ramp, left = speed / acceleration, total - now
+    if now < ramp:
+        return 0.5 * acceleration * now**2, acceleration * now
+    if left < ramp:
+        return distance - 0.5 * acceleration * left**2, acceleration * left
+    return speed * (now - 0.5 * ramp), speed
+
+
 def check_limits(name: str, trajectory: Trajectory, limits: MotionLimits) -> None:
     """Refuse a trajectory that leaves the limits.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ._base import Profile
+from ._base import Profile, ramped
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,11 @@ class Trapezoid(Profile):
 
     @property
     def _way(self) -> tuple[float, float]:
-        """Time of acceleration and of the whole way [s]."""
+        """Speed between the ramps [m/s] and time of the whole way [s]."""
         distance = abs(self.amplitude)
         ramp = min(self.velocity / self.acceleration, math.sqrt(distance / self.acceleration))
         speed = self.acceleration * ramp
-        return ramp, (distance / speed + ramp) if speed > 0.0 else 0.0
+        return speed, (distance / speed + ramp) if speed > 0.0 else 0.0
 
     @property
     def duration(self) -> float:
@@ -35,15 +35,9 @@ class Trapezoid(Profile):
 
     def at(self, t: float) -> tuple[float, float]:
         """Position [m] and velocity [m/s]."""
-        ramp, total = self._way
+        fastest, total = self._way
         turned = t > total + 0.5 * self.dwell
         now = min(max(self.duration - t if turned else t, 0.0), total)
-        left = total - now
-        if now < ramp:
-            way, speed = 0.5 * self.acceleration * now**2, self.acceleration * now
-        elif left < ramp:
-            way, speed = abs(self.amplitude) - 0.5 * self.acceleration * left**2, self.acceleration * left
-        else:
-            way, speed = self.acceleration * ramp * (now - 0.5 * ramp), self.acceleration * ramp
+        way, speed = ramped(now, total, abs(self.amplitude), fastest, self.acceleration)
         sign = math.copysign(1.0, self.amplitude)
         return self.offset + sign * way, sign * (-speed if turned else speed)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from hydraulic_control.errors import ControlError
 
-from ._base import Profile
+from ._base import Profile, ramped
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,13 @@ class Triangle(Profile):
             )
 
     @property
-    def _corner(self) -> tuple[float, float]:
-        """Speed [m/s] between the corners and the time [s] from a point of rest to it.
+    def _speed(self) -> float:
+        """Speed [m/s] between the corners.
 
         Half a period T/2 covers 2A: v·(T/2 − v/a) = 2A, the smaller root.
         """
         half, a = 0.5 / self.frequency, self.acceleration
-        speed = 0.5 * a * (half - math.sqrt(half**2 - 8.0 * abs(self.amplitude) / a))
-        return speed, speed / a
+        return 0.5 * a * (half - math.sqrt(half**2 - 8.0 * abs(self.amplitude) / a))
 
     @property
     def duration(self) -> float:
@@ -49,7 +48,6 @@ class Triangle(Profile):
 
     def at(self, t: float) -> tuple[float, float]:
         """Position [m] and velocity [m/s]."""
-        speed, corner = self._corner
         sign = math.copysign(1.0, self.amplitude)
         low = self.offset - self.amplitude
         if not 0.0 <= t < self.duration:
@@ -58,11 +56,5 @@ class Triangle(Profile):
         phase = math.fmod(t, 2.0 * half)
         back = phase >= half
         now = 2.0 * half - phase if back else phase
-        left = half - now
-        if now < corner:
-            way, rate = 0.5 * self.acceleration * now**2, self.acceleration * now
-        elif left < corner:
-            way, rate = 2.0 * abs(self.amplitude) - 0.5 * self.acceleration * left**2, self.acceleration * left
-        else:
-            way, rate = speed * (now - 0.5 * corner), speed
+        way, rate = ramped(now, half, 2.0 * abs(self.amplitude), self._speed, self.acceleration)
         return low + sign * way, sign * (-rate if back else rate)

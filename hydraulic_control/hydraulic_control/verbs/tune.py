@@ -139,7 +139,7 @@ def _document(found: list[tune_run.CriticalResult], gains: dict[str, Any], tuned
             {"source": one.source, "remark": one.remark, **(one.point.as_document() if one.point else {})}
             for one in found
         ],
-        "rules": {name: g.as_values() for name, g in gains.items()},
+        "rules": {name: asdict(g) for name, g in gains.items()},
         "values": tuned.values,
         "cost": tuned.cost,
         "start_cost": tuned.start_cost,

@@ -9,7 +9,7 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from hydraulic_node_utils import cli
+from hydraulic_node_utils import cli, tables
 
 from .. import slots
 from ..catalogue import describe, parameters_line
@@ -37,10 +37,8 @@ def _effects(options: argparse.Namespace) -> None:
 
 
 def _overview(found: Library) -> None:
-    table = Table(title=f"{len(found)} effects", caption="effects NAME shows one whole")
-    table.add_column("effect", no_wrap=True)
-    table.add_column("what it is")
-    table.add_column("parameters (default)")
+    columns = ("|effect", "what it is", "parameters (default)")
+    table = tables.table(f"{len(found)} effects", columns, caption="effects NAME shows one whole")
     slot = ""
     for effect in found.values():
         if effect.slot != slot:

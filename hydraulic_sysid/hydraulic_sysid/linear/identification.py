@@ -51,23 +51,14 @@ def identify(
     records: Sequence[Record],
     test_records: Sequence[Record] | None = None,
     settings: IdentificationSettings | None = None,
-) -> dict[str, Any]:
-    """Result document of a linear model fitted to ``records`` and tried on ``test_records``.
+) -> tuple[dict[str, Any], LinearModel]:
+    """A linear model fitted to ``records`` and tried on ``test_records``: its result document, and the model.
 
     Without ``test_records`` the last part of every record is kept from the fit and tried on.
 
     :raises IdentificationError: no record, a channel missing, too little or too poor data, an impossible
     sampling time or criterion.
     """
-    return identify_model(records, test_records, settings)[0]
-
-
-def identify_model(
-    records: Sequence[Record],
-    test_records: Sequence[Record] | None = None,
-    settings: IdentificationSettings | None = None,
-) -> tuple[dict[str, Any], LinearModel]:
-    """As `identify`; the model too."""
     settings = settings or IdentificationSettings()
     if not records:
         raise IdentificationError("there is no record to identify from")

@@ -93,7 +93,7 @@ def _identify(options: argparse.Namespace, say: opt.Say) -> opt.Done:
         input=options.input,
         output=options.output,
     )
-    result, model = identification.identify_model(records, test_records, settings)
+    result, model = identification.identify(records, test_records, settings)
     write = partial(write_linear_model, model=model, **identification.about(result))
     return opt.Done(result, {MODEL_FILE: write})
 

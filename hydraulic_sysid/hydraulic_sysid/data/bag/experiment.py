@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any
-
 from hydraulic_interfaces.contract import ABORTED, FINISHED, STARTED
-from hydraulic_sysid.data.bag.types import string_data
+from hydraulic_sysid.data.bag.types import json_data, string_data
 
 ENDED = (FINISHED, ABORTED)
 
@@ -26,16 +23,12 @@ class ExperimentLog:
 
     def take(self, data: bytes) -> None:
         """A serialised message of the topic; one that is not an event (JSON with "event") changes nothing."""
-        try:
-            text = string_data(data)
-            content: Any = json.loads(text)
-        except Exception:  # whatever a stranger publishes there must not end a recording
-            return
-        event = content.get("event") if isinstance(content, dict) else None
+        content = json_data(data)
+        event = content.get("event")
         if event == STARTED:
-            self._started, self._ended, self.outcome = text, "", ""
+            self._started, self._ended, self.outcome = string_data(data), "", ""
         elif event in ENDED and self._started:
-            self._ended, self.outcome = text, str(event)
+            self._ended, self.outcome = string_data(data), str(event)
             stamp = content.get("stamp_ns")
             self.end_ns = stamp if isinstance(stamp, int) else 0
 

@@ -6,6 +6,7 @@ machine without ROS, and does not depend on where message packages are installed
 
 from __future__ import annotations
 
+import json
 import struct
 from dataclasses import dataclass
 from functools import cache
@@ -64,3 +65,12 @@ def string_data(data: bytes) -> str:
     """Text of a serialised std_msgs/String; what is not UTF-8 in it is replaced."""
     message = typestore().deserialize_cdr(data, "std_msgs/msg/String")
     return str(message.data)
+
+
+def json_data(data: bytes) -> dict[str, Any]:
+    """The JSON object in a serialised std_msgs/String; empty where it holds none: anybody may publish anything."""
+    try:
+        content = json.loads(string_data(data))
+    except Exception:  # whatever a stranger publishes must end neither a recording nor its reading
+        return {}
+    return content if isinstance(content, dict) else {}

@@ -13,7 +13,7 @@ from hydraulic_interfaces.contract import PISTON, SERVOVALVE, topic
 from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.bag import cdr, reader
 from hydraulic_sysid.data.bag.reader import Bag
-from hydraulic_sysid.data.bag.types import string_data
+from hydraulic_sysid.data.bag.types import json_data
 from hydraulic_sysid.data.bag.writer import SUFFIX
 from hydraulic_sysid.data.errors import BagError, TimeError
 from hydraulic_sysid.data.records.experiments import Span, spans
@@ -91,14 +91,7 @@ def _records(
 def _plant(bag: Bag) -> dict[str, Any]:
     """What the plant has said of itself, last; empty where it has said nothing."""
     stream = bag.streams.get(topic("description"))
-    for payload in reversed(stream.payloads if stream else ()):
-        try:
-            said = json.loads(string_data(payload))
-        except Exception:  # anybody may publish anything there
-            continue
-        if isinstance(said, dict):
-            return said
-    return {}
+    return next(filter(None, map(json_data, reversed(stream.payloads if stream else ()))), {})
 
 
 def _sampled(bag: Bag, notes: list[str]) -> tuple[Index, dict[str, Array]]:

@@ -13,23 +13,9 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import ColumnMapError, FileError
 from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header, named_columns
-from hydraulic_sysid.data.records.record import Record
-from hydraulic_sysid.data.records.table import records_of_table
 
 SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz")
 _GZIP_MAGIC = b"\x1f\x8b"
-
-
-def read_csv(path: Path, columns: ColumnMap | None, name: str) -> list[Record]:
-    """Records in a text file; without a map its header must name channels as ``<channel>_<unit>``.
-
-    :raises FileError: unreadable, empty, ragged, or a cell that is no number; names row and column.
-    :raises ColumnMapError: a header that names no channel, or has a wrong unit.
-    """
-    table = CsvTable(path, columns)
-    if columns is None or not columns.parts:
-        columns = table.map_of_header(columns)
-    return records_of_table(table, columns, name)
 
 
 class CsvTable:
@@ -37,6 +23,8 @@ class CsvTable:
 
     Separator (; tab , or blanks), decimal comma and header are looked for where the map does not fix them. Rows
     are counted from 1, with the header and empty lines, as an editor shows them.
+
+    :raises FileError: unreadable, empty, or ragged; names row and column.
     """
 
     def __init__(self, path: Path, columns: ColumnMap | None = None) -> None:
@@ -75,8 +63,8 @@ class CsvTable:
         self._comma = decimal == ","
         self._numbers: Array | None = None
 
-    def map_of_header(self, base: ColumnMap | None = None) -> ColumnMap:
-        """The map that the header states; ``base`` says the rest, and perhaps the time.
+    def own_map(self, base: ColumnMap | None = None) -> ColumnMap:
+        """The map that a header of ``<channel>_<unit>`` states; ``base`` says the rest, and perhaps the time.
 
         :raises ColumnMapError: no header, no time, or a name that is no channel with a unit.
         """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -13,7 +12,7 @@ from hydraulic_interfaces.contract import FINISHED, STARTED, topic
 from hydraulic_sim.arrays import Index
 from hydraulic_sysid.data.bag.experiment import ENDED
 from hydraulic_sysid.data.bag.reader import Bag
-from hydraulic_sysid.data.bag.types import string_data
+from hydraulic_sysid.data.bag.types import json_data
 from hydraulic_sysid.data.errors import BagError
 
 
@@ -37,7 +36,8 @@ def spans(bag: Bag, stamps: Index) -> list[Span]:
     :raises BagError: all of them did.
     """
     stream = bag.streams.get(topic("experiment"))
-    events = [event for event in map(_event, stream.payloads if stream else ()) if event is not None]
+    said = map(json_data, stream.payloads if stream else ())
+    events = [event for event in said if isinstance(event.get("stamp_ns"), int)]
     starts = [
         index
         for index, event in enumerate(events)
@@ -75,13 +75,3 @@ def _span(begin: dict[str, Any], following: Sequence[dict[str, Any]], stamps: In
             notes.append(f"experiment: {end['event']} ({end.get('reason') or 'no reason given'})")
     first, last = np.searchsorted(stamps, [begin["stamp_ns"], until], side="left")
     return Span(int(first), int(last), "", experiment, notes)
-
-
-def _event(payload: bytes) -> dict[str, Any] | None:
-    """The event in a message; None where it holds something else, which is none of the excitation's."""
-    try:
-        event = json.loads(string_data(payload))
-    except Exception:  # anybody may publish anything there
-        return None
-    usable = isinstance(event, dict) and isinstance(event.get("stamp_ns"), int)
-    return event if usable else None

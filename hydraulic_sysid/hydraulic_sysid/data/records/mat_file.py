@@ -10,26 +10,15 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import ColumnMapError, FileError
 from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header, named_columns
-from hydraulic_sysid.data.records.record import Record
-from hydraulic_sysid.data.records.table import records_of_table
 
 SUFFIXES = (".mat",)
 
 
-def read_mat(path: Path, columns: ColumnMap | None, name: str) -> list[Record]:
-    """Records in a MATLAB file; without a map its vectors must be called ``<channel>_<unit>``.
-
-    :raises FileError: unreadable, or a variable is missing or no vector of real numbers.
-    :raises ColumnMapError: without a map: no variables with such names.
-    """
-    table = MatTable(path)
-    if columns is None or not columns.parts:
-        columns = table.map_of_names(columns)
-    return records_of_table(table, columns, name)
-
-
 class MatTable:
-    """The variables of a MATLAB file; a matrix gives its columns as ``name.1``, ``name.2`` and so on."""
+    """The variables of a MATLAB file; a matrix gives its columns as ``name.1``, ``name.2`` and so on.
+
+    :raises FileError: unreadable.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -48,8 +37,8 @@ class MatTable:
         """Names of all columns."""
         return list(self._columns)
 
-    def map_of_names(self, base: ColumnMap | None = None) -> ColumnMap:
-        """The map that the variables' names state; other variables are left out. ``base`` says the rest.
+    def own_map(self, base: ColumnMap | None = None) -> ColumnMap:
+        """The map of vectors called ``<channel>_<unit>``; other variables are left out. ``base`` says the rest.
 
         :raises ColumnMapError: no time, or no channel.
         """

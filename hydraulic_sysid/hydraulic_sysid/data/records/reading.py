@@ -8,7 +8,10 @@ from pathlib import Path
 from hydraulic_sysid.data.errors import FileError, RecordError
 from hydraulic_sysid.data.records import csv_file, mat_file
 from hydraulic_sysid.data.records.column_map import ColumnMap, load_column_map
+from hydraulic_sysid.data.records.csv_file import CsvTable
+from hydraulic_sysid.data.records.mat_file import MatTable
 from hydraulic_sysid.data.records.record import Record
+from hydraulic_sysid.data.records.table import records_of_table
 
 _BAG_SUFFIX = ".mcap"
 _SUFFIXES = (*csv_file.SUFFIXES, *mat_file.SUFFIXES, _BAG_SUFFIX)
@@ -66,10 +69,8 @@ def _read(path: Path, columns: ColumnMap | None) -> list[Record]:
         from hydraulic_sysid.data.records.bag_record import read_bag
 
         return read_bag(path, columns.irregular if columns else "error")
-    stem = path.name[: -len(suffix)]
-    if suffix in mat_file.SUFFIXES:
-        return mat_file.read_mat(path, columns, stem)
-    return csv_file.read_csv(path, columns, stem)
+    table = MatTable(path) if suffix in mat_file.SUFFIXES else CsvTable(path, columns)
+    return records_of_table(table, columns, path.name[: -len(suffix)])
 
 
 def _kinds() -> str:

@@ -38,6 +38,9 @@ class Table(Protocol):
     def label(self, column: str | int) -> str | int:
         """How to name a column to the user."""
 
+    def own_map(self, base: ColumnMap | None = None) -> ColumnMap:
+        """The map that the names of the columns state; ``base`` says the rest."""
+
 
 @dataclass(frozen=True)
 class Samples:
@@ -54,12 +57,15 @@ class Samples:
     units: Mapping[str, str] = field(default_factory=dict)
 
 
-def records_of_table(table: Table, columns: ColumnMap, name: str) -> list[Record]:
-    """One record per part of the map (more where it says to split at gaps).
+def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list[Record]:
+    """One record per part of the map (more where it says to split at gaps); without one the table's own map.
 
+    :raises ColumnMapError: without a map: a name that is no channel, or has a wrong unit.
     :raises FileError: a column is missing or holds a value that is not finite; names row and column.
     :raises TimeError: the time is not even, and the map does not say what to do then.
     """
+    if columns is None or not columns.parts:
+        columns = table.own_map(columns)
     records = []
     for part, mapped in columns.parts.items():
         notes = list(columns.notes)

@@ -75,7 +75,7 @@ def compare(
             if any(name in by for by in maps.values())
         },
         "verdict": _verdict(summary, found, horizon),
-        "findings": [f.as_dict() for f in found],
+        "findings": [dict(vars(f)) for f in found],
         "summary": summary,
         "error_maps": _plain_maps(maps),
         "records": documents,
@@ -123,7 +123,7 @@ def _maps(compared: Sequence[Compared], channels: Sequence[str]) -> dict[str, di
 
 
 def _plain_maps(maps: dict[str, dict[str, ErrorMap]]) -> dict[str, Any]:
-    return {name: {v: m.as_dict() for v, m in by.items()} for name, by in maps.items()}
+    return {name: {v: dict(vars(m)) for v, m in by.items()} for name, by in maps.items()}
 
 
 def _pooled(documents: Sequence[dict[str, Any]], channel: str) -> dict[str, Any]:

@@ -42,10 +42,6 @@ class ErrorMap:
     chance_level: float
     """What that share may reach by chance, given how few independent samples a slow error has."""
 
-    def as_dict(self) -> dict[str, object]:
-        """For the result document."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
 
 def adaptive_edges(values: Array, bins: int = BINS) -> Array:
     """Edges ``(≤ bins + 1,)`` that follow half the range and half the density of the values.
@@ -131,17 +127,9 @@ def error_map(error: Array, binning: Binning, folds: Index, independent: float |
     table = np.array(rows, dtype=float).reshape(-1, 7)
     known = np.isfinite(error)
     share = cross_validated_share(error[known], binning.index[known], folds[known], binning.starts.size - 1)
-    return ErrorMap(
-        center=table[:, 0],
-        count=table[:, 1].astype(np.int64),
-        mean=table[:, 2],
-        median=table[:, 3],
-        low=table[:, 4],
-        high=table[:, 5],
-        rms=table[:, 6],
-        explained=share,
-        chance_level=min(1.0, _CHANCE / max(independent, 1.0)),
-    )
+    center, count, mean, median, low, high, rms = table.T
+    chance = min(1.0, _CHANCE / max(independent, 1.0))
+    return ErrorMap(center, count.astype(np.int64), mean, median, low, high, rms, share, chance)
 
 
 def cross_validated_share(error: Array, index: Index, folds: Index, bins: int) -> float:

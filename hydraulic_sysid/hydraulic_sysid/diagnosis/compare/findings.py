@@ -35,10 +35,6 @@ class Finding:
     weight: float
     numbers: Mapping[str, Any]
 
-    def as_dict(self) -> dict[str, Any]:
-        """For the result document."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
 
 def size_finding(channel: str, unit: str, rmse: float, exact: float, noise: float, horizon: float) -> Finding:
     """How large the error is beside what an exact model would show."""

@@ -143,7 +143,7 @@ def _maps(residuals: Sequence[Array], studied: Sequence[RecordBalances]) -> Iter
         values = np.concatenate([_variable(s, variable, r.size) for s, r in zip(studied, residuals, strict=True)])
         if np.ptp(values) > 0.0:
             binning = error_maps.Binning.of(values, error_maps.DIRECTION_EDGES if variable == "direction" else None)
-            yield variable, error_maps.error_map(error, binning, folds, independent).as_dict()
+            yield variable, dict(vars(error_maps.error_map(error, binning, folds, independent)))
 
 
 def _variable(s: RecordBalances, name: str, length: int) -> Array:

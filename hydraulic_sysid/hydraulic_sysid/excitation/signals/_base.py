@@ -61,5 +61,15 @@ class Signal(Declared):
         return 0.0
 
 
+class Wave(Signal):
+    """A signal that repeats at its ``frequency`` [Hz]."""
+
+    frequency: float
+
+    @property
+    def highest_frequency(self) -> float:
+        return self.frequency
+
+
 def _times(value: Any, factor: float) -> Any:
     return tuple(factor * item for item in value) if isinstance(value, tuple) else factor * value

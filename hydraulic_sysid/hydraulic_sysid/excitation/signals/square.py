@@ -8,11 +8,11 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.declared import number
-from hydraulic_sysid.excitation.signals._base import Signal, amplitude
+from hydraulic_sysid.excitation.signals._base import Wave, amplitude
 
 
 @dataclass(frozen=True)
-class Square(Signal):
+class Square(Wave):
     """+A for the first half of every period, −A for the second; `shift` begins later in the period.
 
     A shift of a quarter moves the piston of an integrating plant to both sides of its start.
@@ -21,10 +21,6 @@ class Square(Signal):
     amplitude: float = amplitude("height of the square")
     frequency: float = number("Hz", "how often it repeats", above=0.0, maximum=500.0)
     shift: float = number("", "part of a period that is left out at the start", 0.0, minimum=0.0, maximum=1.0)
-
-    @property
-    def highest_frequency(self) -> float:
-        return self.frequency
 
     def sample(self, t: Array) -> Array:
         slack = 1e-9  # a sample that falls on an edge belongs to the new half, whatever the rounding

@@ -8,11 +8,11 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.declared import number
-from hydraulic_sysid.excitation.signals._base import Signal, amplitude
+from hydraulic_sysid.excitation.signals._base import Wave, amplitude
 
 
 @dataclass(frozen=True)
-class Triangle(Signal):
+class Triangle(Wave):
     """A triangle from 0 up to +A, down to −A and back: the same time at every drive, slowly through null.
 
     It shows what sits around null: deadband, stiction, underlap, bias.
@@ -20,10 +20,6 @@ class Triangle(Signal):
 
     amplitude: float = amplitude("peak of the triangle")
     frequency: float = number("Hz", "how often it repeats", above=0.0, maximum=1000.0)
-
-    @property
-    def highest_frequency(self) -> float:
-        return self.frequency
 
     def sample(self, t: Array) -> Array:
         turn = np.mod(np.asarray(t) * self.frequency + 0.25, 1.0)  # a quarter on, so that it starts at zero, rising

@@ -57,8 +57,7 @@ def welch(drive: ArrayLike, output: ArrayLike, dt: float, segment: float, *, int
 
     :raises FrequencyResponseError: fewer than three segments lie in the record.
     """
-    u, y = _pair(drive, output)
-    u, y = (u[:-1], np.diff(y)) if integrating else (u, y)
+    u, y = _pair(drive, output, integrating)
     count = round(segment / dt)
     if count < 8 or u.size < 2 * count:
         raise FrequencyResponseError(
@@ -80,8 +79,7 @@ def etfe(drive: ArrayLike, output: ArrayLike, dt: float, width: float, *, integr
 
     :raises FrequencyResponseError: `width` is below three lines, or above the Nyquist frequency.
     """
-    u, y = _pair(drive, output)
-    u, y = (u[:-1], np.diff(y)) if integrating else (u, y)
+    u, y = _pair(drive, output, integrating)
     spacing = 1.0 / (u.size * dt)
     half = round(width / spacing)
     if half < 1 or width > 0.5 / dt:
@@ -111,10 +109,10 @@ def _spectral(
     return Spectral(frequency, response, np.clip(coherence, 0.0, 1.0), s_uu / s_uu.max(), averages)
 
 
-def _pair(drive: ArrayLike, output: ArrayLike) -> tuple[Array, Array]:
+def _pair(drive: ArrayLike, output: ArrayLike, integrating: bool) -> tuple[Array, Array]:
     u, y = np.asarray(drive, dtype=float), np.asarray(output, dtype=float)
     if u.shape != y.shape or u.ndim != 1 or u.size < 16:
         raise FrequencyResponseError(f"drive {u.shape} and output {y.shape} must be equal, one-dimensional, 16 or more")
     if not (np.ptp(u) > 0.0):
         raise FrequencyResponseError("the drive does not move: nothing is excited")
-    return u, y
+    return (u[:-1], np.diff(y)) if integrating else (u, y)

@@ -46,11 +46,6 @@ class ArxOrder:
         return max(self.na, self.nb + self.nk - 1)
 
     @property
-    def state_size(self) -> int:
-        """Length of the filter state that the past leaves behind."""
-        return max(self.na, self.nb + self.nk - 1, 1)
-
-    @property
     def text(self) -> str:
         """The usual name: ``ARX(3, 3, 1)``."""
         return f"ARX({self.na}, {self.nb}, {self.nk})"
@@ -121,7 +116,7 @@ class ArxModel(LinearModel):
             forced = lfilter(num, den, u) + lfilter([1.0], den, np.full(u.size, self.constant)) + self.output_offset
 
         def modes() -> Array:
-            units = np.eye(self.order.state_size)
+            units = np.eye(self.order.memory)  # of the filter state that the past leaves behind
             return np.stack([lfilter(num, den, np.zeros(u.size), zi=unit)[0] for unit in units], axis=1)
 
         return free_run(forced, y, modes)

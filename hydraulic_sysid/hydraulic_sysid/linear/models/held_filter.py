@@ -22,10 +22,10 @@ from .state_recursion import propagate
 
 @dataclass(frozen=True)
 class Derivatives:
-    """``single`` (N, n+1): σᵏ/α·v, k = 0 … n. ``double`` (N, 2n): σᵏ/α²·v, k = 0 … 2n−1, or None."""
+    """``single`` (N, n+1): σᵏ/α·v, k = 0 … n. ``double`` (N, 2n): σᵏ/α²·v, k = 0 … 2n−1; empty where not squared."""
 
     single: Array
-    double: Array | None
+    double: Array
 
 
 class Filter:
@@ -97,7 +97,7 @@ class Filter:
         lower = self.alpha[::-1]
         single = np.column_stack((states[:, :n], source - states[:, :n] @ lower))
         if not self.squared:
-            return Derivatives(single, None)
+            return Derivatives(single, np.empty((len(states), 0)))
         double = np.empty((len(states), 2 * n))
         double[:, :n] = states[:, n:]
         for k in range(n):

@@ -19,11 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation import metrics
 from hydraulic_sysid.linear.errors import IdentificationError
 
-from .model import LinearModel
 from .structures import Structure, fit_on_equal_samples
 
 CRITERIA = ("fpe", "aic", "bic", "cv")
@@ -101,11 +99,7 @@ def _cross_validated(
         except IdentificationError:
             return float("inf")
         for u, y, (a, b) in zip(us, ys, inside, strict=True):
-            squares += _free_run_squares(model, u[a:b], y[a:b])
+            left = y[a:b] - model.simulate(u[a:b], y[a:b])
+            squares += float(np.sum(left**2)) if np.isfinite(left).all() else float("inf")
             count += b - a
     return squares / count
-
-
-def _free_run_squares(model: LinearModel, u: Array, y: Array) -> float:
-    free = model.simulate(u, y)
-    return float(np.sum((y - free) ** 2)) if np.isfinite(free).all() else float("inf")

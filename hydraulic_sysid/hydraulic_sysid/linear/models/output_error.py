@@ -129,12 +129,6 @@ def _experiment(problem: Problem, filters: Filter, u: Array) -> tuple[Array, lis
     columns = np.hstack([d.single[:, powers] for d, powers in sources])
     free = n - int(problem.integrator)
     sensitivities = [
-        np.hstack([-_doubled(d, [k + n - j for k in powers]) for d, powers in sources]) for j in range(1, free + 1)
+        np.hstack([-d.double[:, [k + n - j for k in powers]] for d, powers in sources]) for j in range(1, free + 1)
     ]
     return columns, sensitivities
-
-
-def _doubled(d: Derivatives, powers: list[int]) -> Array:
-    """σᵏ/α²·v for each power."""
-    assert d.double is not None
-    return d.double[:, powers]

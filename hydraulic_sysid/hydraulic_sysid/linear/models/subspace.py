@@ -95,7 +95,8 @@ def _horizons(order: int, samples: int) -> list[int]:
 def _fit(pairs: Pairs, dt: float, order: int, horizon: int, direct: bool, offsets: str) -> StateSpaceModel:
     subspace = project(pairs, horizon, offsets == "estimate")
     if subspace.singular_values[order - 1] < _RELATIVE * subspace.singular_values[0]:
-        raise IdentificationError(f"the record holds no more than {_rank(subspace)} states: lower the order {order}")
+        rank = int(np.sum(subspace.singular_values > _RELATIVE * subspace.singular_values[0]))
+        raise IdentificationError(f"the record holds no more than {rank} states: lower the order {order}")
     gamma = subspace.vectors[:, :order] * np.sqrt(subspace.singular_values[:order])
     A = np.linalg.lstsq(gamma[:-1], gamma[1:], rcond=None)[0]
     C = gamma[0].copy()
@@ -137,10 +138,6 @@ def _rows(pairs: Pairs, i: int, constant: bool) -> Iterator[list[Array]]:
 
 def _past(u: Array, y: Array, i: int, n: int) -> list[Array]:
     return [*(u[k : k + n] for k in range(i)), *(y[k : k + n] for k in range(i))]
-
-
-def _rank(subspace: Subspace) -> int:
-    return int(np.sum(subspace.singular_values > _RELATIVE * subspace.singular_values[0]))
 
 
 def _with_inputs(A: Array, C: Array, pairs: Pairs, dt: float, direct: bool, constant: bool) -> StateSpaceModel:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -68,24 +69,21 @@ def rmse_grid(models: Mapping[str, LinearModel], plant: Plant, grid: Grid, dt: f
     model). The plant starts at rest, where the drive's mean motion is centred in the stroke.
     """
     cells = []
-    for shape in grid.shapes:
-        for amplitude in grid.amplitudes:
-            for frequency in grid.frequencies:
-                count = max(grid.periods, int(np.ceil(grid.shortest * frequency)))
-                duration = count / frequency
-                drive = periodic(shape, amplitude, frequency, duration, dt)
-                position, inside = _centred(plant, drive, dt)
-                cells.append(
-                    {
-                        "shape": shape,
-                        "amplitude": float(amplitude),
-                        "frequency": float(frequency),
-                        "duration": duration,
-                        "std": float(np.std(position)),
-                        "within_travel": inside,
-                        "models": {name: errors(model, drive, position, dt) for name, model in models.items()},
-                    }
-                )
+    for shape, amplitude, frequency in product(grid.shapes, grid.amplitudes, grid.frequencies):
+        duration = max(grid.periods, int(np.ceil(grid.shortest * frequency))) / frequency
+        drive = periodic(shape, amplitude, frequency, duration, dt)
+        position, inside = _centred(plant, drive, dt)
+        cells.append(
+            {
+                "shape": shape,
+                "amplitude": float(amplitude),
+                "frequency": float(frequency),
+                "duration": duration,
+                "std": float(np.std(position)),
+                "within_travel": inside,
+                "models": {name: errors(model, drive, position, dt) for name, model in models.items()},
+            }
+        )
     return cells
 
 

@@ -62,7 +62,12 @@ def validate(
         **heading("validate", 2),
         "title": "Validation of identified models",
         "models": [
-            {"name": name, "source": s.source, "sampling_time": s.model.dt, "stable": _stable(s.model)}
+            {
+                "name": name,
+                "source": s.source,
+                "sampling_time": s.model.dt,
+                "stable": all(pole.stable for pole in s.model.poles()),
+            }
             for name, s in subjects.items()
         ],
         "plant": None if plant is None else plant.model.name,
@@ -102,10 +107,6 @@ def _one_step(model: LinearModel, record: Record, subject: Subject) -> dict[str,
         "best_fit_one_step": 100.0 * (1.0 - float(np.linalg.norm(left)) / spread) if spread else float("nan"),
         "residual_tests": residual_tests(left, u[model.memory :]),
     }
-
-
-def _stable(model: LinearModel) -> bool:
-    return all(pole.stable for pole in model.poles())
 
 
 def _summary(name: str, cells: Sequence[dict[str, Any]]) -> dict[str, Any]:

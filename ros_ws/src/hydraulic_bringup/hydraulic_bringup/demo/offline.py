@@ -79,7 +79,7 @@ def analyse(records: list[Record], test_records: list[Record], model: Model, out
         # A record sampled more slowly than usual is identified at its own sampling time.
         sampling = max(identification.IdentificationSettings().sampling_time, *(r.dt for r in records))
         settings = identification.IdentificationSettings(sampling_time=sampling)
-        identified = identification.identify(records, test_records or None, settings)
+        identified, _ = identification.identify(records, test_records or None, settings)
         results.write_result(out, identified)
     except IdentificationError as error:
         left_out = f"not identified: {error}"

@@ -151,12 +151,7 @@ def document(
 
 
 def _bandwidth(found: Bandwidth) -> dict[str, float]:
-    return {
-        "position": found.position,
-        "velocity": found.velocity,
-        "velocity_gain": found.velocity_gain,
-        "critical_gain": found.critical_gain,
-    }
+    return {name: getattr(found, name) for name in ("position", "velocity", "velocity_gain", "critical_gain")}
 
 
 def _excitation(one: study.Identified, record: Record, origins: Mapping[str, str]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from hydraulic_sysid.excitation.signals.sawtooth import Sawtooth
 from hydraulic_sysid.excitation.signals.sine import Sine
 from hydraulic_sysid.excitation.signals.square import Square
 from hydraulic_sysid.excitation.signals.triangle import Triangle
-from hydraulic_sysid.linear.identification import IdentificationSettings, identify_model
+from hydraulic_sysid.linear.identification import IdentificationSettings, identify
 from hydraulic_sysid.linear.models import LinearModel, TransferFunctionOrder
 from hydraulic_sysid.linear.models.structures import Arx, TransferFunction
 from hydraulic_sysid.linear.validation import Grid
@@ -104,7 +104,7 @@ def identified(excitation: Excitation, record: Record) -> Identified:
     """
     settings = IDENTIFICATION[excitation.kind]
     part = played(excitation, record)
-    document, model = identify_model([part], None, settings)
+    document, model = identify([part], None, settings)
     return Identified(excitation, document, model, part.split(1.0 - settings.holdout)[1])
 
 
