@@ -45,11 +45,9 @@ class MinimumJerk(Profile):
 
     @property
     def duration(self) -> float:
-        """Seconds until it rests for good."""
         return 2.0 * self.time + self.dwell if self.back else self.time
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         if self.time <= 0.0:
             return self.offset + self.amplitude, 0.0
         if self.back and t > self.time + 0.5 * self.dwell:

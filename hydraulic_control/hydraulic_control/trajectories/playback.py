@@ -37,11 +37,9 @@ class Playback:
 
     @property
     def duration(self) -> float:
-        """Seconds until it rests for good."""
         return self._duration
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         if t < 0.0:
             return self._ends[0], 0.0
         if t > self._duration:

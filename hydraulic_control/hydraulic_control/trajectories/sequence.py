@@ -21,7 +21,6 @@ class Rest:
     jumps: ClassVar[bool] = False
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         return self.position, 0.0
 
 
@@ -33,16 +32,13 @@ class Sequence:
 
     @property
     def duration(self) -> float:
-        """Seconds until it rests for good."""
         return sum(part.duration for part in self._parts)
 
     @property
     def jumps(self) -> bool:
-        """Whether a part's position jumps."""
         return any(part.jumps for part in self._parts)
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         for part in self._parts[:-1]:
             if t < part.duration:
                 return part.at(t)

@@ -21,11 +21,9 @@ class Sine(Profile):
 
     @property
     def duration(self) -> float:
-        """Seconds until it rests for good."""
         return (self.cycles + 2) / self.frequency
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         t = min(max(t, 0.0), self.duration)
         rising, slope = blend(t * self.frequency)
         if t * self.frequency > self.cycles + 1:

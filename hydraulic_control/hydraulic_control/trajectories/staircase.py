@@ -18,11 +18,9 @@ class Staircase(Profile):
 
     @property
     def duration(self) -> float:
-        """Seconds until it rests for good."""
         return (2 * self.levels + 1) * self.dwell
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         number = min(max(int(t / self.dwell), 0), 2 * self.levels)
         level = self.levels - abs(self.levels - number)
         return self.offset + self.amplitude * level / self.levels, 0.0

@@ -17,9 +17,7 @@ class Step(Profile):
 
     @property
     def duration(self) -> float:
-        """Seconds until it rests for good."""
         return 1.5 * self.dwell
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         return self.offset + (self.amplitude if t >= 0.5 * self.dwell else 0.0), 0.0

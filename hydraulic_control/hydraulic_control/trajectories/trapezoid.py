@@ -30,11 +30,9 @@ class Trapezoid(Profile):
 
     @property
     def duration(self) -> float:
-        """Seconds until it rests for good."""
         return 2.0 * self._way[1] + self.dwell
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         fastest, total = self._way
         turned = t > total + 0.5 * self.dwell
         now = min(max(self.duration - t if turned else t, 0.0), total)

@@ -43,11 +43,9 @@ class Triangle(Profile):
 
     @property
     def duration(self) -> float:
-        """Seconds until it rests for good."""
         return self.cycles / self.frequency
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position [m] and velocity [m/s]."""
         sign = math.copysign(1.0, self.amplitude)
         low = self.offset - self.amplitude
         if not 0.0 <= t < self.duration:

@@ -185,6 +185,10 @@ class _Template:
             # hold another, while behind the last field there may be some, left over from an earlier message.
             self._fields.append((form, self._buffer.index(form.pack(*values))))
 
+    def __call__(self, stamp_ns: int, *numbers: float) -> bytes:
+        """CDR bytes for `Publisher.publish`: this stamp, and a number for each field."""
+        return self.fill(stamp_ns, *((number,) for number in numbers))
+
     def fill(self, stamp_ns: int, *fields: tuple[float, ...]) -> bytes:
         """The message with this stamp and these numbers."""
         buffer = self._buffer
@@ -208,46 +212,30 @@ class StateEncoder:
         return self._template.fill(sample.stamp_ns, position, (sample.velocity,), effort)
 
 
-class CommandEncoder:
-    """Serialised `command` messages of one source, equal in content to those of `command_to_message`."""
+class CommandEncoder(_Template):
+    """Serialised `command` messages of one source by stamp and drive, as of `command_to_message`."""
 
     def __init__(self, source: str) -> None:
-        self._template = _Template(command_to_message(Command(0, source, _MARKS[0])), _MARKS[:1])
-
-    def __call__(self, stamp_ns: int, drive: float) -> bytes:
-        """CDR bytes for `Publisher.publish`."""
-        return self._template.fill(stamp_ns, (drive,))
+        super().__init__(command_to_message(Command(0, source, _MARKS[0])), _MARKS[:1])
 
 
-class ReferenceEncoder:
-    """Serialised `reference` messages, equal in content to those of `reference_to_message`."""
+class ReferenceEncoder(_Template):
+    """Serialised `reference` messages by stamp, position and velocity, as of `reference_to_message`."""
 
     def __init__(self) -> None:
         x, v = _MARKS[:2]
-        self._template = _Template(reference_to_message(Reference(0, x, v)), (x,), (v,))
-
-    def __call__(self, stamp_ns: int, position: float, velocity: float) -> bytes:
-        """CDR bytes for `Publisher.publish`."""
-        return self._template.fill(stamp_ns, (position,), (velocity,))
+        super().__init__(reference_to_message(Reference(0, x, v)), (x,), (v,))
 
 
-class PressureEncoder:
-    """Serialised pressure messages, equal in content to those of `pressure_to_message`."""
+class PressureEncoder(_Template):
+    """Serialised pressure messages by stamp and pressure, as of `pressure_to_message`."""
 
     def __init__(self) -> None:
-        self._template = _Template(pressure_to_message(0, _MARKS[0]), _MARKS[:1])
-
-    def __call__(self, stamp_ns: int, pressure: float) -> bytes:
-        """CDR bytes for `Publisher.publish`."""
-        return self._template.fill(stamp_ns, (pressure,))
+        super().__init__(pressure_to_message(0, _MARKS[0]), _MARKS[:1])
 
 
-class ClockEncoder:
-    """Serialised `/clock` messages."""
+class ClockEncoder(_Template):
+    """Serialised `/clock` messages by stamp."""
 
     def __init__(self) -> None:
-        self._template = _Template(Clock())
-
-    def __call__(self, stamp_ns: int) -> bytes:
-        """CDR bytes for `Publisher.publish`."""
-        return self._template.fill(stamp_ns)
+        super().__init__(Clock())
