@@ -17,7 +17,7 @@ from hydraulic_can_driver.codec import PdoCodec
 from hydraulic_can_driver.errors import BusDownError, DeviceError
 from hydraulic_can_driver.faults import NEEDS_CONFIGURE, BusFault, FaultLatch
 from hydraulic_can_driver.frames import Frames
-from hydraulic_can_driver.master import PRE_OPERATIONAL, START, Master
+from hydraulic_can_driver.master import ERROR_REGISTER, PRE_OPERATIONAL, START, Master
 from hydraulic_can_driver.measuring import Measuring
 from hydraulic_can_driver.receiver import HEARTBEAT, OPERATIONAL, Receiver
 from hydraulic_can_driver.supervision import Supervision
@@ -315,7 +315,7 @@ class Bench:
 
     def _no_errors(self, nodes: list[Node]) -> None:
         for node in nodes:
-            if register := self.master.error_register(node):
+            if register := int(self.master.read(node, ERROR_REGISTER)):
                 raise DeviceError(f"{node.name} reports an error: error register 0x{register:02X}")
 
     def _quieten(self) -> None:

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Iterable
 
-from hydraulic_can_driver.bus import Bus, Node
+from hydraulic_can_driver.bus import Bus
 from hydraulic_can_driver.codec import PdoCodec
 from hydraulic_can_driver.errors import CodecError
 from hydraulic_can_driver.faults import BusFault, FaultLatch
@@ -143,7 +143,3 @@ class Frames:
         for cob_id, data in frames.items():
             found |= self._codecs[cob_id].decode(data)
         return found
-
-    def sender(self, cob_id: int) -> Node:
-        """The device that sends a frame."""
-        return self._nodes[cob_id]

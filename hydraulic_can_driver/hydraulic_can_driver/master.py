@@ -20,7 +20,7 @@ from hydraulic_can_driver.errors import BusDownError, CodecError, DeviceError
 from hydraulic_can_driver.receiver import NMT, Receiver
 
 DEVICE_TYPE = Address(0x1000, 0, "u32")
-ERROR_REGISTER = Address(0x1001, 0, "u8")
+ERROR_REGISTER = Address(0x1001, 0, "u8")  # 0 while the device has no error
 CONSUMER_HEARTBEAT = Address(0x1016, 1, "u32")
 PRODUCER_HEARTBEAT = Address(0x1017, 0, "u16")
 IDENTITY = {
@@ -142,10 +142,6 @@ class Master:
         :raises DeviceError: one cannot be read.
         """
         return {row.name: to_quantity(self.read(node, row.address), row.scale) for row in node.inspect}
-
-    def error_register(self, node: Node) -> int:
-        """Object 0x1001: 0 while the device has no error."""
-        return int(self.read(node, ERROR_REGISTER))
 
     def watch_master(self, node: Node, on: bool) -> None:
         """Let the device watch the heartbeat of the driver, or no longer; it goes to 0 V when that fails."""

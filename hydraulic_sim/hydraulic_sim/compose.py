@@ -100,7 +100,7 @@ class Writer:
         )
 
     def _value(self, effect: Effect, argument: str) -> str:
-        if argument in effect.parameter_names:
+        if argument in (p.name for p in effect.parameters):
             return self.parameter(f"{effect.name}.{argument}")
         if argument in (s.name for s in effect.states):
             return f"S[{self.layout.states[f'{effect.name}.{argument}']}]"

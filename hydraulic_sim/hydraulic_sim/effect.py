@@ -125,11 +125,6 @@ class Effect:
             if not getattr(self, text).strip():
                 raise EffectError(f"effect {self.name or '?'}: {text} is empty")
 
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names of the parameters, without the effect's."""
-        return tuple(p.name for p in self.parameters)
-
     def functions(self) -> dict[str, Callable]:
         """The functions that are compiled: ``kernel`` and, with states, ``dynamics``."""
         found = {"kernel": self.kernel}

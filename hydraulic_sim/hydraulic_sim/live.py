@@ -42,13 +42,6 @@ class LivePlant:
         x, v, p_a, p_b, p_s, spool = self._out[0, :6].tolist()
         return PlantValues(x, v, p_a, p_b, p_s, spool, p_a * self._areas[0] - p_b * self._areas[1], applied)
 
-    def set_value(self, key: str, value: float) -> None:
-        """Change a parameter while running (SI).
-
-        :raises ModelError: an unknown key or a value out of bounds.
-        """
-        self.replace_model(self.plant.model.with_values({key: value}))
-
     def replace_model(self, model: Model) -> None:
         """Go on with another model of the same library (effects on or off, other values) from the present state.
 

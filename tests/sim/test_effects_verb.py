@@ -20,7 +20,7 @@ def test_json_holds_every_effect_with_all_that_it_says(capsys: pytest.CaptureFix
     assert set(records) == set(found)
     for name, record in records.items():
         assert record["equation"] == found[name].equation
-        assert [p["name"] for p in record["parameters"]] == list(found[name].parameter_names)
+        assert [p["name"] for p in record["parameters"]] == [p.name for p in found[name].parameters]
         assert all(p["unit"] and p["source"] for p in record["parameters"])
         assert {"slot", "source", "excited_by", "confused_with"} <= set(record)
 

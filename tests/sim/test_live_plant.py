@@ -24,4 +24,4 @@ def test_an_effect_file_edited_while_the_plant_runs_is_refused(tmp_path: Path) -
     live.plant = SimpleNamespace(model=model)  # type: ignore[assignment]
     file.write_text(file.read_text() + "\n# edited\n")
     with pytest.raises(ModelError, match="edited"):
-        live.set_value("moving_mass", 1.01 * model.value("moving_mass"))
+        live.replace_model(model.with_values({"moving_mass": 1.01 * model.value("moving_mass")}))

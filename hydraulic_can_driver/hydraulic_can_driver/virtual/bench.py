@@ -168,7 +168,7 @@ class VirtualBench:
 
     def _on_heartbeat(self, cob_id: int, data: bytearray, timestamp: float) -> None:
         with self._lock:
-            self.valve.heard_heartbeat(cob_id - _HEARTBEAT)
+            self.valve.master.heartbeat(cob_id - _HEARTBEAT)
 
     def _on_sync(self, cob_id: int, data: bytearray, timestamp: float) -> None:
         with self._lock, self._watched():

@@ -27,7 +27,7 @@ class MasterWatch:
         self._heartbeat = None
 
     def heartbeat(self, node_id: int) -> None:
-        """A heartbeat has come."""
+        """A heartbeat of any node has come."""
         if node_id == self._master_id and self._period > 0.0:
             self._heartbeat = self._now()
 

@@ -91,10 +91,6 @@ class Valve(Device):
         """The master is there."""
         self.master.command()
 
-    def heard_heartbeat(self, node_id: int) -> None:
-        """A heartbeat of any node."""
-        self.master.heartbeat(node_id)
-
     def take_over(self) -> None:
         """See `Device.take_over`; every SYNC is a sign of the master."""
         if self.operational:

@@ -90,9 +90,9 @@ class Simulator(PlantBackend):
             self._switch_effects(value)
             return
         if name.startswith(MODEL_PREFIX):
-            key = name.removeprefix(MODEL_PREFIX)
-            self._live.set_value(key, value)
-            self._take_model(self._live.plant.model)
+            model = self._live.plant.model.with_values({name.removeprefix(MODEL_PREFIX): value})
+            self._live.replace_model(model)
+            self._take_model(model)
             return
         quantity, _, what = name.partition("_")
         sensors = {"position": [self._position], "velocity": [self._velocity], "pressure": self._pressures}

@@ -157,7 +157,7 @@ def _bandwidth(found: Bandwidth) -> dict[str, float]:
 def _excitation(one: study.Identified, record: Record, origins: Mapping[str, str]) -> dict[str, Any]:
     plan, (held,) = one.excitation.plan, one.document["test"]["records"]
     assert plan.prediction is not None
-    whole = study.played(one.excitation, record)
+    whole = study.played(plan, record)
     return {
         "name": one.excitation.name,
         "excitation": one.excitation.kind,

@@ -86,15 +86,9 @@ def excitations(
     return found
 
 
-def approached(excitation: Excitation, seconds: float) -> Excitation:
-    """The same with an approach of so many seconds."""
-    return replace(excitation, plan=replace(excitation.plan, approach=seconds))
-
-
-def played(excitation: Excitation, record: Record) -> Record:
+def played(plan: Plan, record: Record) -> Record:
     """The signal's part of a record, without the rests around it."""
-    begin = excitation.plan.signal_start
-    return record.window(begin, begin + excitation.plan.active_time)
+    return record.window(plan.signal_start, plan.signal_start + plan.active_time)
 
 
 def identified(excitation: Excitation, record: Record) -> Identified:
@@ -103,7 +97,7 @@ def identified(excitation: Excitation, record: Record) -> Identified:
     :raises IdentificationError: the record does not give the model.
     """
     settings = IDENTIFICATION[excitation.kind]
-    part = played(excitation, record)
+    part = played(excitation.plan, record)
     document, model = identify([part], None, settings)
     return Identified(excitation, document, model, part.split(1.0 - settings.holdout)[1])
 

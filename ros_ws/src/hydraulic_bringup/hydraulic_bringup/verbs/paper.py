@@ -72,7 +72,7 @@ def _run(options: argparse.Namespace) -> None:
         made = study.excitations(model, bandwidth.position, study.DURATION_S, steps.tick, bands)
         if options.quick:
             short = study.excitations(model, bandwidth.position, duration, steps.tick, ("in",))
-            made = [*(study.approached(e, study.SHORT_APPROACH_S) for e in short), *made]
+            made = [*(replace(e, plan=replace(e.plan, approach=study.SHORT_APPROACH_S)) for e in short), *made]
         extra = (
             [] if options.quick else [load_plan("probe"), *study.recorded_shapes(model, bandwidth.position, _SHAPES_S)]
         )
@@ -130,18 +130,13 @@ def _analyse(
             measured = from_record(records["probe"])[0]
         except BandwidthError as error:
             steps.say(f"bandwidth not measured: {error}")
-    shapes = [_signal_part(plan, records[plan.name]) for plan in extra if plan.name != "probe"]
+    shapes = [replace(study.played(p, records[p.name]), name=p.name) for p in extra if p.name != "probe"]
     result = document(model.name, Plant(model), bandwidth, measured, found, records, origins, shapes, not_fitted)
     steps.done()
     steps.begin("control", 10.0)
     result["control"] = control.evaluate(model, control.save_models(found, out))
     steps.done()
     return result
-
-
-def _signal_part(plan: Plan, record: Record) -> Record:
-    part = record.window(plan.signal_start, plan.signal_start + plan.active_time)
-    return replace(part, name=plan.name)
 
 
 if __name__ == "__main__":
