@@ -6,10 +6,11 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hydraulic_control.errors import ControlError
-from hydraulic_sim.arrays import Array
 
+Array = NDArray[np.float64]
 BAND = 0.02
 """Settled means within this part of the step."""
 

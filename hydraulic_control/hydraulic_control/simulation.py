@@ -13,8 +13,7 @@ import numpy as np
 
 from hydraulic_control.compiled_loop import physical
 from hydraulic_control.controller import Controller
-from hydraulic_control.response import Response
-from hydraulic_sim.arrays import Array
+from hydraulic_control.response import Array, Response
 from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
