@@ -368,6 +368,10 @@ def test_failed_build_says_which_why_and_what_to_do_and_is_tried_again(checkout:
 
 
 def test_all_tests_run_those_of_the_wall_clock_last_and_the_closing_line_sums_up(built: FakeCheckout) -> None:
+    for name, text in (("pace", "@pytest.mark.timing"), ("seal", "")):
+        file = built.root / f"tests/pump/test_{name}.py"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
     answer = built.bench("test")
     assert answer.returncode == 0, answer.stderr
     calls = [re.sub(r"-o cache_dir=\S+ | -n \d+", "", call) for call in built.calls()]
@@ -376,7 +380,7 @@ def test_all_tests_run_those_of_the_wall_clock_last_and_the_closing_line_sums_up
         "-m ruff check .",
         "-m mypy",
         "-m pytest -m not timing -p xdist --dist=loadfile --no-loadscope-reorder tests",
-        "-m pytest -m timing tests",
+        "-m pytest -m timing tests/pump/test_pace.py",
     ]
     assert answer.stdout.count("collected 2 items") == 2
     assert answer.stdout.splitlines()[-1].startswith("=== 4 passed, 2 warnings in ")

@@ -13,7 +13,7 @@ from typing import Protocol
 from hydraulic_plant_node.command_gate import CommandGate
 
 PATIENCE_S = 5.0
-"""How long (wall time) an answer is waited for; beyond the 3 s after which the middleware repeats a lost packet."""
+"""How long (wall time) an answer is waited for; beyond the 3 s after which a foreign node may repeat a lost packet."""
 AHEAD_S = 0.25
 """How far (plant time) the plant may be ahead of a recorder: a small part of what publishers keep, and little enough at
 once for the middleware to lose nothing of it."""
