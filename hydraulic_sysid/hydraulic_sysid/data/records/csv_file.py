@@ -87,7 +87,7 @@ class CsvTable:
         return columns
 
     def numbers(self, column: str | int) -> Array:
-        """``(N,)`` numbers of a column."""
+        """``(N,)`` numbers of a column; a `FileError` names row and column of a cell that is no number."""
         index = self._index(column)
         if self._numbers is None:
             try:

@@ -59,7 +59,7 @@ class MatTable:
         return columns
 
     def numbers(self, column: str | int) -> Array:
-        """``(N,)`` numbers of a variable."""
+        """``(N,)`` numbers of a variable; `FileError` where it is missing or no vector of real numbers."""
         name = self._name(column)
         return np.asarray(self._columns[name], dtype=np.float64)
 
