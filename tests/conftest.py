@@ -117,7 +117,6 @@ ONE_BY_ONE = {
     "control/test_nodes.py",
     "hidden_effects/test_diagnosis.py",
     "plant_node/test_plant_node.py",
-    "sim/test_user_effects.py",
     "sysid/test_excitation_node.py",
     "sysid/test_locate.py",
     "sysid/test_recorder_node.py",

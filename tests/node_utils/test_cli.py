@@ -128,7 +128,7 @@ def test_a_package_runs_its_verbs(package: str) -> None:
     verb = next(iter(cli.verbs(package)))
     done = subprocess.run(
         [sys.executable, "-m", package, verb, "--help"], capture_output=True, text=True,
-        env={"PYTHONPATH": ":".join(path for path in sys.path if path)}, timeout=100,
+        env={"PYTHONPATH": ":".join(path for path in sys.path if path)}, timeout=500,
     )  # fmt: skip
     assert done.returncode == 0
     assert done.stdout.startswith(f"usage: {package} {verb}")
@@ -151,5 +151,5 @@ def test_output_into_a_pipe_that_closes_is_no_error(tmp_path: Path) -> None:
         assert process.stdin and process.stdout and process.stderr
         process.stdout.close()
         process.stdin.close()
-        assert process.wait(60) == 0
+        assert process.wait(500) == 0
         assert process.stderr.read() == b""

@@ -15,7 +15,7 @@ SEMAPHORE = "import ctypes; s = ctypes.create_string_buffer(64); ctypes.CDLL(Non
 
 def run(*lines: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, timeout=500, check=False
     )
 
 

@@ -94,7 +94,7 @@ def leak(plant: Plant) -> float:
 
 
 def result(process: subprocess.Popen[str]) -> float:
-    output, errors = process.communicate(timeout=110.0)
+    output, errors = process.communicate(timeout=500.0)
     assert process.returncode == 0, errors
     return -float(output)
 
