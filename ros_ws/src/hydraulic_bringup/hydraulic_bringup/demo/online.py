@@ -43,7 +43,6 @@ _CLIENT = "hydraulic_bringup.nodes._graph_client"
 _START_S = 90.0  # the first start on a machine compiles the physics
 _STEP_S = 60.0
 _STRETCHED = 20.0  # by how much a busy machine may stretch an experiment
-_LAST_WORDS_S = 3.0
 
 
 class Steps(Protocol):
@@ -211,7 +210,6 @@ def excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, ste
     steps.done()
     step = f"{experiment.name}: excite and record"
     steps.begin(step, seconds + 2.0)
-    told = len(client.events)
     excitation = crew.start(
         f"excitation_{suffix}", "hydraulic_sysid.nodes.excitation", "--ros-args",
         "-p", f"plan:={experiment.plan}", "-p", "autostart:=true", "-p", "exit_when_done:=true",
@@ -225,26 +223,15 @@ def excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, ste
         crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
         steps.done()
         return ""
-    ends = _aborts(client, told)
-    if not ends:
-        words = excitation.tail()
-        if NOT_STARTED not in words:
-            excitation.may_end = ()
-            crew.check(step)
+    words = excitation.tail()  # a log is whole when its process has ended; its messages may still be on the way
+    if NOT_STARTED in words:
         recorder.stop()
         return words[words.rindex(NOT_STARTED) :].splitlines()[0]
+    if (aborted := f" {ABORTED}: ") not in words:
+        excitation.may_end = ()
+        crew.check(step)
     crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
-    return str(ends[-1]["reason"])
-
-
-def _aborts(client, told: int) -> list[dict]:
-    """The aborts after so many events; the process may be gone a moment before its last words are here."""
-    deadline = time.monotonic() + _LAST_WORDS_S
-    while True:
-        ends = [event for event in client.events[told:] if event["event"] == ABORTED]
-        if ends or time.monotonic() > deadline:
-            return ends
-        time.sleep(0.05)
+    return words.rpartition(aborted)[2].splitlines()[0]
 
 
 def take_down_left(code: int) -> None:

@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service, topic
+from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service
 from hydraulic_interfaces.qos import profile
 from hydraulic_node_utils.nodes.exit_guard import exit_guard
 
@@ -45,8 +45,6 @@ class GraphClient:
         self._executor.add_node(self._node)
         self._status: dict[str, Any] = {}
         self._node.create_subscription(String, f"{absolute(RECORDER_NODE)}/status", self._on_status, profile("latched"))
-        self.events: list[dict[str, Any]] = []  # of the experiments, in their order
-        self._node.create_subscription(String, topic("experiment"), self._on_experiment, profile("experiment"))
         self._leaving = False
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
@@ -71,9 +69,6 @@ class GraphClient:
     def _on_status(self, message: String) -> None:
         status = json.loads(message.data)
         self._status[status["output"]] = status
-
-    def _on_experiment(self, message: String) -> None:
-        self.events.append(json.loads(message.data))
 
     def recorder_status(self, folder: str) -> dict[str, Any]:
         """What the recorder has said last about a bag; empty before."""
