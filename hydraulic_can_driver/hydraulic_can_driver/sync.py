@@ -101,6 +101,10 @@ class LockstepBeat(LoopBeat):
         super().__init__(master, frames, period_ns)
         self.lead_ns = 0
 
+    def first_instant(self, earliest_ns: int) -> int:
+        """One period after the last SYNC, as cycles before the loop are as fast as the devices answer."""
+        return max(earliest_ns, self._frames.instant_ns + self._period_ns)
+
     def next_sync(self) -> int:
         """One period after the last."""
         return (self._frames.sync_ns or time.time_ns()) + self._period_ns

@@ -14,8 +14,11 @@ from hydraulic_can_driver import bench as bench_module
 from hydraulic_can_driver import sync
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus import Bus
+from hydraulic_can_driver.bus_file import load_bus
+from hydraulic_can_driver.faults import FaultLatch
+from hydraulic_can_driver.frames import Frames
 from hydraulic_can_driver.nodes.can_driver import CanPlant
-from hydraulic_can_driver.sync import KernelBeat
+from hydraulic_can_driver.sync import KernelBeat, LockstepBeat
 from hydraulic_interfaces.samples import Command, PlantSample
 from hydraulic_plant_node.command_gate import CommandGate
 from hydraulic_plant_node.plant_loop import LoopTiming, PlantLoop
@@ -117,6 +120,23 @@ def running(kernel_bench: Bench, wait_until: Any) -> Iterator[tuple[PlantLoop, P
 def off_phase(nanoseconds: int) -> float:
     """Distance from the nearest whole number of periods, as a share of the period."""
     return abs((nanoseconds + PERIOD // 2) % PERIOD - PERIOD // 2) / PERIOD
+
+
+def test_in_lockstep_the_loop_goes_on_after_the_last_sync_however_far_that_is_ahead() -> None:
+    """Cycles before the loop are as fast as the devices answer; time must not go back when it begins."""
+
+    class Line:
+        def send(self, cob_id: int, data: bytes) -> None: ...
+
+    frames = Frames(load_bus("bench"), FaultLatch())
+    beat = LockstepBeat(Line(), frames, PERIOD)  # type: ignore[arg-type]
+    for _ in range(1000):
+        assert beat.exchange(0x510, b"", beat.next_sync())
+    now = time.monotonic_ns()
+    first = beat.first_instant(now + PERIOD)
+    assert first - now + time.time_ns() > frames.sync_ns
+    assert first - now == pytest.approx(1000 * PERIOD, rel=0.1)
+    assert beat.first_instant(first + 10 * PERIOD) == first + 10 * PERIOD
 
 
 @pytest.mark.timing

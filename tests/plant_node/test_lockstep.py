@@ -80,11 +80,15 @@ def run(wait_until: Any) -> Iterator[Callable[..., tuple[PlantLoop, Far]]]:
     started: list[tuple[PlantLoop, Far]] = []
 
     def start(
-        answer: Callable[[PlantSample], float | None], until: Callable[[PlantLoop, Far], Any], **timing: Any
+        answer: Callable[[PlantSample], float | None],
+        until: Callable[[PlantLoop, Far], Any],
+        backend: Scripted | None = None,
+        **timing: Any,
     ) -> tuple[PlantLoop, Far]:
         gate, ports = CommandGate(), Far(answer)
         gate.enable(True)
-        loop = PlantLoop(Scripted(), gate, ports, LoopTiming(PERIOD, own_clock=True, lockstep=True, **timing))
+        pace = LoopTiming(PERIOD, own_clock=True, lockstep=True, **timing)
+        loop = PlantLoop(backend or Scripted(), gate, ports, pace)
         started.append((loop, ports))
         loop.start()
         wait_until(lambda: until(loop, ports) or not loop.alive, "the end of the run")
@@ -151,6 +155,22 @@ def test_without_a_source_it_goes_no_faster_than_the_wall(run: Any) -> None:
     begun = time.monotonic()
     run(lambda sample: None, samples(100), factor=100.0)
     assert time.monotonic() - begun > 0.09
+
+
+def test_stamps_begin_where_the_plant_says_and_the_wall_clock_was_not_set(run: Any) -> None:
+    class Ahead(Scripted):
+        first = 0
+
+        def first_instant(self, earliest_ns: int) -> int:
+            self.first = earliest_ns + 3600 * 10**9
+            return self.first
+
+    backend = Ahead()
+    offset = time.time_ns() - time.monotonic_ns()
+    loop, ports = run(number, samples(200), backend)
+    assert abs(ports.samples[0].stamp_ns - offset - backend.first) < 10**8
+    assert abs(loop.wall_clock_step()) < 1.0
+    check_answers(ports.samples)
 
 
 def test_a_source_at_a_rate_of_its_own_is_not_waited_for(run: Any) -> None:

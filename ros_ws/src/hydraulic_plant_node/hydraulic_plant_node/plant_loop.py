@@ -148,6 +148,7 @@ class PlantLoop:
                 self.scheduling = request_realtime(self._timing.priority)
             self._gate.forget()  # a drive that an earlier run was ended with
             cycle = self._cycle if self.lockstep is None else self._cycle_in_lockstep
+            self._wall_offset_ns = time.time_ns() - time.monotonic_ns()
             cycle(Pacer().wait)
         except Exception as error:
             # Whatever a backend throws: the drive must end at 0 V, and somebody must hear of it.
@@ -167,7 +168,6 @@ class PlantLoop:
         catch_up = _OWN_CLOCK_CATCH_UP if timing.own_clock else self._backend.catch_up
         origin = self._backend.first_instant(time.monotonic_ns() + round(wall_period))
         grace = 1.0 - self._backend.tolerated_lateness
-        self._wall_offset_ns = time.time_ns() - time.monotonic_ns()
         first_stamp = max(origin + self._wall_offset_ns, self.last_stamp_ns + timing.period_ns)
         slot = 0
         while not self._stopping:
@@ -199,7 +199,8 @@ class PlantLoop:
         assert lockstep is not None
         answered_period = round(timing.period_ns / timing.factor)
         due = time.monotonic_ns() + timing.period_ns
-        stamp = max(time.time_ns(), self.last_stamp_ns) + timing.period_ns
+        first = self._backend.first_instant(due)  # of plant time, which may be ahead of the wall clock already
+        stamp = max(first + self._wall_offset_ns, self.last_stamp_ns + timing.period_ns)
         while not self._stopping:
             now = wait(due)
             self.monitor.tick(now, now)
