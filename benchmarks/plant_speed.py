@@ -9,17 +9,16 @@ written by hand; it needs a C compiler and is left out where there is none.
 from __future__ import annotations
 
 import ctypes
-import os
 import shutil
 import subprocess
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from hydraulic_sim.batch import Job, simulate_batch
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 
@@ -135,10 +134,8 @@ def main() -> None:
         seconds, found = solver_seconds(base, short, "LSODA", rtol)
         error = float(np.max(np.abs(found - reference)) / np.ptp(reference))
         print(f"LSODA rtol {rtol:.0e}: error {error:.1e} (ours {own:.1e}); {seconds / quick:.0f} times our time")
-    drives = [drive[:20000]] * 16
-    one = best_of(lambda: [full.simulate(each, DT) for each in drives], 3)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        two = best_of(lambda: list(pool.map(lambda each: full.simulate(each, DT), drives)), 3)
+    jobs = [Job(full, drive[:20000], DT)] * 16
+    one, two = best_of(lambda: simulate_batch(jobs, 1), 3), best_of(lambda: simulate_batch(jobs), 3)
     print(
         f"batch of 16 x 20 s: one by one {one * 1e3:.0f} ms, all cores {two * 1e3:.0f} ms, {one / two:.2f} times faster"
     )

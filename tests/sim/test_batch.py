@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import sys
 import threading
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
-from hydraulic_sim.batch import scatter
+from hydraulic_sim.batch import Job, scatter, simulate_batch
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
@@ -32,29 +31,30 @@ def same(one: Trajectory, other: Trajectory) -> bool:
     )
 
 
-@pytest.mark.parametrize("workers", [1, 2, 5])
-def test_many_threads_give_bit_for_bit_what_one_by_one_gives(bare: Model, everything: Model, workers: int) -> None:
+@pytest.mark.parametrize("workers", [None, 1, 2, 5])
+def test_a_batch_is_bit_for_bit_what_one_by_one_gives(bare: Model, everything: Model, workers: int | None) -> None:
     plants = [Plant(bare), Plant(everything)] + [
         Plant(m) for m in scatter(everything, {"moving_mass": 0.1, "coulomb_friction.level": 0.3}, 6, seed=3)
     ]
-
-    def run(i: int) -> Trajectory:
-        return plants[i].simulate(drive(400 + 50 * i, seed=i), DT, plants[i].initial_state(position=0.05 * i))
-
-    alone = [run(i) for i in range(len(plants))]
-    with ThreadPoolExecutor(workers) as pool:
-        together = list(pool.map(run, range(len(plants))))
+    jobs = [
+        Job(plant, drive(400 + 50 * i, seed=i), DT, plant.initial_state(position=0.05 * i))
+        for i, plant in enumerate(plants)
+    ]
+    alone = [job.plant.simulate(job.drive, job.dt, job.initial) for job in jobs]
+    together = simulate_batch(jobs, workers)
+    assert len(together) == len(jobs)
     assert all(same(one, other) for one, other in zip(alone, together, strict=True))
     assert not same(alone[2], alone[3])
 
 
-def test_a_plant_that_fails_in_one_thread_leaves_the_others_alone(bare: Model) -> None:
-    good, bad = Plant(bare), broken(bare)
-    with ThreadPoolExecutor(2) as pool:
-        found = [pool.submit(plant.simulate, drive(50), DT) for plant in (good, bad, good)]
-        with pytest.raises(SimulationError, match="no longer finite"):
-            found[1].result()
-        assert same(found[0].result(), found[2].result())
+def test_an_empty_batch_is_empty() -> None:
+    assert simulate_batch([]) == []
+
+
+def test_a_failing_job_fails_the_batch(bare: Model) -> None:
+    good = Plant(bare)
+    with pytest.raises(SimulationError, match="no longer finite"):
+        simulate_batch([Job(good, drive(50), DT), Job(broken(bare), drive(50), DT), Job(good, drive(50), DT)])
 
 
 def broken(model: Model) -> Plant:
