@@ -224,14 +224,14 @@ def excite_and_record(crew: Crew, client, experiment: Experiment, bag: Path, ste
         steps.done()
         return ""
     words = excitation.tail()  # a log is whole when its process has ended; its messages may still be on the way
-    if NOT_STARTED in words:
-        recorder.stop()
-        return words[words.rindex(NOT_STARTED) :].splitlines()[0]
-    if (aborted := f" {ABORTED}: ") not in words:
+    if (aborted := f" {ABORTED}: ") in words:
+        crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
+        return words.rpartition(aborted)[2].splitlines()[0]
+    if NOT_STARTED not in words:
         excitation.may_end = ()
         crew.check(step)
-    crew.wait(lambda: recorder.exit_code == 0, step, _STEP_S, steps.tick)
-    return words.rpartition(aborted)[2].splitlines()[0]
+    recorder.stop()
+    return words[words.rindex(NOT_STARTED) :].splitlines()[0]
 
 
 def take_down_left(code: int) -> None:
