@@ -26,7 +26,6 @@ from hydraulic_sim.plant import Plant
 CHANGES: dict[str, dict[str, Any]] = {
     "": {"interface": "virtual", "channel": "contract", "rate": 200},  # devices and driver in one process
     "master": {"lost_after": 10.0},
-    "limits": {"frozen_time": 10.0, "velocity": 100.0},
     "monitoring": {"missed_cycles": 1000, "sync_gap": 10.0, "state_change": 10.0, "heartbeats": 100},
 }
 
