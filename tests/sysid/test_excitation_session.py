@@ -142,6 +142,14 @@ def test_the_reason_holds_what_the_plant_complained_of_during_the_run():
     assert bench.events[-1]["reason"] == expected
 
 
+def test_an_abort_on_request_does_not_blame_the_plant():
+    bench = Bench().run(500)
+    bench.session.diagnose(COMMAND_ROW, False, "no command: drive is 0 V", {"source": ""})  # said before the run
+    assert bench.session.stop("asked to abort")
+    bench.run(1500)
+    assert bench.events[-1]["reason"] == "asked to abort"
+
+
 def test_a_piston_that_runs_away_ends_the_run():
     bench = Bench().run(500)
     bench.position = 0.31

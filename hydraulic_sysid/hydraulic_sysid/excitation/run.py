@@ -42,6 +42,7 @@ class ExcitationRun:
         self.plan = plan
         self.phase = Phase.PLAYING
         self.reason = ""
+        self.requested = False  # that it ends was asked for; nothing went wrong
         self.drive = 0.0
         self.played = 0
         self._approach = round(plan.approach * plan.rate)  # samples
@@ -94,7 +95,7 @@ class ExcitationRun:
     def stop(self, reason: str) -> None:
         """End the run on request: the drive falls to zero within STOP_RAMP_S, then the run is aborted."""
         if self.phase is Phase.PLAYING:
-            self.phase, self.reason = Phase.STOPPING, reason
+            self.phase, self.reason, self.requested = Phase.STOPPING, reason, True
             self._stop_drive, self._end = self.drive, self._time + STOP_RAMP_S
 
     def check_age(self, age: float) -> bool:

@@ -115,7 +115,8 @@ class Session:
         self._announced, self.ended = True, run.phase
         kind, reason = FINISHED, ""
         if run.phase is Phase.ABORTED:
-            kind, reason = ABORTED, "; the plant says: ".join(filter(None, (run.reason, self.plant.trouble)))
+            trouble = "" if run.requested else self.plant.trouble
+            kind, reason = ABORTED, "; the plant says: ".join(filter(None, (run.reason, trouble)))
         self.last_end = f"{run.plan.name} {kind}" + (f": {reason}" if reason else "")
         self._emit(experiment_event(kind, run, self._started_ns, self._stamp_ns, reason))
 
