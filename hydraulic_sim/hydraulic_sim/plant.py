@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike
 from . import base, rates
 from .arrays import Array
 from .compiled import compiled
+from .effect import arguments
 from .embedded import Embedded
 from .errors import SimulationError
 from .model import Model
+from .slots import PER_SAMPLE
 from .trajectory import PlantState, Trajectory
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
@@ -210,6 +212,22 @@ class Plant:
     def has_inner_states(self) -> bool:
         """Whether an effect that is on has states of its own, which no sensor sees, or never forgets a drive."""
         return any(e.states or (e.slot == "command" and e.memory and e.reach is None) for e in self._active)
+
+    @property
+    def drive_path(self) -> tuple[float | str, ...] | None:
+        """All that inner states follow from besides the drive: effects and values; None where the motion matters too.
+
+        Plants of one library with the same path propagate a record to the same inner states.
+        """
+        inner = [e for e in self._active if e.states or e.slot == "command"]
+        alone = {"command", "t", *PER_SAMPLE}
+        for e in inner:
+            own = {p.name for p in e.parameters} | {s.name for s in e.states}
+            taken = arguments(e.dynamics) if e.dynamics else arguments(e.kernel)
+            if not alone.issuperset(set(taken) - own):
+                return None
+        keys = ["drive_limit", *(f"{e.name}.{p.name}" for e in inner for p in e.parameters)]
+        return (*(e.name for e in inner), *(self.value(k) for k in keys))
 
     def track(self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike) -> tuple[Array, Array]:
         """States at each start, those that no sensor sees propagated along the record, the others as measured.

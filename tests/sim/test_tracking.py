@@ -41,3 +41,26 @@ def test_what_forgets_soon_needs_no_leading(bench: Model) -> None:
     assert not Plant(bench).has_inner_states
     assert not Plant(bench.with_effect("command_delay")).has_inner_states
     assert not Plant(bench.with_effect("sensor_backlash")).has_inner_states
+
+
+@pytest.mark.parametrize("effect", ["spool_dynamics", "spool_rate_limit"])
+def test_states_that_follow_from_the_drive_alone_are_those_of_any_plant_with_the_same_valve(
+    bench: Model, effect: str
+) -> None:
+    one = Plant(bench.with_effect(effect))
+    other = one.with_parameters({"moving_mass": 1.1 * one.value("moving_mass")})
+    assert one.drive_path is not None and other.drive_path == one.drive_path
+    drive, seen, starts = slowly(one)
+    smoothed = np.stack([seen[c] for c in SEEN], axis=-1)
+    inner = [k for k, name in enumerate(one.state_names) if name not in (*SEEN, "stick")]
+    (mine, memories), (others, other_memories) = (p.track(drive, DT, starts, smoothed) for p in (one, other))
+    assert inner and np.array_equal(mine[:, inner], others[:, inner]) and np.array_equal(memories, other_memories)
+    parameter = next(p.name for p in bench.library[effect].parameters)
+    moved = one.with_parameters({f"{effect}.{parameter}": 1.1 * one.value(f"{effect}.{parameter}")})
+    assert moved.drive_path != one.drive_path
+
+
+@pytest.mark.parametrize("effect", ["supply_droop", "structural_flexibility"])
+def test_states_that_the_motion_moves_too_have_no_path_of_the_drive(bench: Model, effect: str) -> None:
+    plant = Plant(bench.with_effect(effect))
+    assert plant.has_inner_states and plant.drive_path is None

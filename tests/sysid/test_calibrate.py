@@ -203,9 +203,13 @@ def test_without_pressures_the_rest_is_still_fitted_and_less_is_told(records: li
     assert both > 0.99
 
 
-def test_small_motion_without_pressures_does_not_tell_mass_from_oil(model: Model) -> None:
-    result = calibrate(model, [bare(noisy("small", clean(1, 4.0, 0.1), 3))]).result
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_small_motion_without_pressures_does_not_tell_mass_from_oil(model: Model, seed: int) -> None:
+    """In short segments: over half a second the ringing of the oil turns too far for differences of parameters."""
+    small = [bare(noisy("small", clean(1, 4.0, 0.1), seed))]
+    result = calibrate(model, small, settings=FitSettings(length=0.1)).result
     assert any({"moving_mass", "bulk_modulus"} <= set(d["weights"]) for d in result["not_identifiable"])
+    assert not named(result, "moving_mass")["identifiable"]
     assert not named(result, "viscous_friction.coefficient")["identifiable"]
     assert not named(result, "internal_leakage.coefficient")["identifiable"]
 
@@ -222,21 +226,34 @@ def test_what_standing_still_does_not_tell_is_named(model: Model) -> None:
     assert "viscous_friction.coefficient" in render([plain(done.result)])
 
 
-def test_robust_loss_survives_dropouts(axis: list[dict[str, Array]], model: Model) -> None:
-    spoiled = []
+def spoiled(axis: list[dict[str, Array]], width: int) -> list[Record]:
+    """Two records in which every hundredth sample is wild, ``width`` of them in a row."""
+    found = []
     for i, channels in enumerate(axis[:2]):
         record = noisy(f"record_{i}", channels, 10 + i)
         wild = {c: record[c].copy() for c in record.channels}
         draw = np.random.default_rng(i)
         for channel, off in (("position", 0.01), ("pressure_a", -7e6), ("pressure_b", -7e6)):
-            wild[channel][draw.choice(len(record), len(record) // 100, replace=False)] += off
-        spoiled.append(Record.sampled(record.name, DT, wild, record.source))
-    off = {}
-    for robust in (False, True):
-        result = calibrate(model, spoiled, (), FitSettings(robust=robust)).result
-        off[robust] = {p["key"]: abs(p["value"] / TRUTH[p["key"]] - 1.0) for p in result["parameters"]}
-    assert max(off[True].values()) < 0.05
-    assert max(off[False].values()) > 0.1
+            begin = draw.choice(len(record) // width, len(record) // (100 * width), replace=False) * width
+            wild[channel][(begin[:, None] + np.arange(width)).ravel()] += off
+        found.append(Record.sampled(record.name, DT, wild, record.source))
+    return found
+
+
+def worst(model: Model, records: list[Record], robust: bool) -> float:
+    """How far the worst parameter is off what made the data, of its value."""
+    result = calibrate(model, records, (), FitSettings(robust=robust)).result
+    return max(abs(p["value"] / TRUTH[p["key"]] - 1.0) for p in result["parameters"])
+
+
+def test_single_wild_samples_do_not_count_whatever_the_loss(axis: list[dict[str, Array]], model: Model) -> None:
+    assert worst(model, spoiled(axis, 1), False) < 0.05
+    assert worst(model, spoiled(axis, 1), True) < 0.05
+
+
+def test_robust_loss_survives_dropouts(axis: list[dict[str, Array]], model: Model) -> None:
+    assert worst(model, spoiled(axis, 4), True) < 0.05
+    assert worst(model, spoiled(axis, 4), False) > 0.1
 
 
 def test_robust_noise_std_does_not_follow_outliers() -> None:

@@ -9,7 +9,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
-from hydraulic_sysid.diagnosis.search.holdout import split
+from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
 from hydraulic_sysid.diagnosis.search.score_test import CandidateScore
@@ -25,7 +25,7 @@ from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise import code_step
 from hydraulic_sysid.estimation.parameters import bounded, scale
-from hydraulic_sysid.estimation.segments import Segments
+from hydraulic_sysid.estimation.segments import cut
 
 DT = 1e-3
 
@@ -98,13 +98,10 @@ def test_a_line_that_the_valve_modulates_is_found_between_side_bands(line: float
     time = DT * np.arange(20001)
     drive = np.sign(np.sin(2.0 * np.pi * reversals * time))
     seen = drive * np.sin(2.0 * np.pi * line * time + 0.7) + np.random.default_rng(5).standard_normal(time.size)
-    first = np.arange(0, 20000, 500)
     record = Record.sampled("r", DT, {"drive": drive, "position": np.zeros(time.size)})
-    nothing = np.zeros(0)
-    segments = Segments(
-        record, first, 501, ("position",), nothing, nothing, nothing, free=np.arange(2), prior_std=nothing
-    )
-    residual = np.concatenate([seen[first[:, None] + np.arange(501)], np.zeros((len(first), 2))], axis=1)
+    (segments,) = cut([record], "mechanical", 0.5)
+    index = segments.first[:, None] + np.arange(segments.samples)
+    residual = np.concatenate([seen[index], np.zeros((len(segments), 2))], axis=1)
     assert spectral_lines([segments], [residual])[0] == pytest.approx(line, abs=0.01)
 
 
@@ -127,7 +124,7 @@ def state(model, total: float, refits: dict[str, float]) -> SearchState:
 
 
 def at(total: float) -> Misfit:
-    return Misfit(2.0 * total / 3.0, total / 3.0, 2000, 1000)
+    return Misfit(2.0 * total / 3.0, total / 3.0, 2000, 1000, typical=total / 3000)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +154,7 @@ def test_what_a_law_leaves_is_no_effect(model, name: str, left: float, absorbs: 
 def test_what_an_effect_leaves_decides_whether_it_is_the_one(model, before: float, after: float, kind: str) -> None:
     with_it = model.with_effect("constant_load")
     base, final = state(model, 3000 * before, {}), state(with_it, 3000 * after, {})
-    found = SearchResult(model, None, FitSettings(), base, final, {"constant_load": final.misfit}, {})  # type: ignore[arg-type]
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     assert verdict.kind_of(found, tied=False) == kind
 
 

@@ -33,7 +33,7 @@ def test_the_hidden_dead_band_is_found_and_its_width_too(run: Path) -> None:
     assert found["verdict"]["subsystem"] == "valve"
     first = found["effects"][0]
     assert (first["name"], first["rank"], first["added"]) == ("valve_deadband", 1, True)
-    assert first["residual_before"] > 10.0 > 1.3 > first["residual_after"]
+    assert first["residual_before"] > 5.0 > 1.1 > first["residual_after"]
     width = first["parameters"][0]
     assert width["value"] == pytest.approx(0.03, rel=0.02) and width["standard_error"] > 0.0
     assert [s["name"] for s in found["residual"]["after_each_effect"]] == ["valve_deadband"]
@@ -45,7 +45,7 @@ def test_the_hidden_dead_band_is_found_and_its_width_too(run: Path) -> None:
 def test_why_not_the_runner_up_is_said_with_its_figure(run: Path) -> None:
     found = json.loads((run / "diagnose.json").read_text())
     second = found["competing_models"]["valve_deadband"][0]
-    assert second["distinguishable"] and second["residual_after"] > 5.0
+    assert second["distinguishable"] and second["residual_after"] > 2.0
     assert f"{second['name']} instead of valve_deadband leaves" in found["verdict"]["text"]
 
 
@@ -76,6 +76,27 @@ CURVE = {
     "low": [-0.1, 0.0, 0.0],
     "high": [0.1, 0.2, 0.2],
 }
+NUMBER = {
+    "key": "supply_pressure",
+    "unit": "Pa",
+    "nominal": 14e6,
+    "value": 15.81e6,
+    "standard_error": 1e4,
+    "chi_square_difference": 4e3,
+    "instead": ["backlash"],
+}
+DATA_SHEET = {"data_sheet": [NUMBER]}
+FAULT = {
+    "name": "drive",
+    "channels": ["position"],
+    "size": -1e-3,
+    "unit": "s",
+    "standard_error": 1e-5,
+    "text": "the drive was late",
+    "remedy": "mend it",
+}
+SPIKES = {"channel": "pressure_a", "count": 3, "share": 1e-3, "places": [{"record": "steps", "time": 1.5}]}
+RECORDING = {"recording": {"faults": [FAULT], "spikes": [SPIKES], "mains_lines": {"pressure_a": [50.0]}}}
 OUTSIDE = {"nonparametric_curves": [CURVE], "nearest_effects": ["backlash"]}
 
 
@@ -85,6 +106,8 @@ OUTSIDE = {"nonparametric_curves": [CURVE], "nearest_effects": ["backlash"]}
         ("outside the library", OUTSIDE, "The shape of what is left; 40.0\u00a0%; library: backlash; Write an effect"),
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
         ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
+        ("data sheet", DATA_SHEET, "Ask for the true supply_pressure; 158.1; backlash"),
+        ("recording", RECORDING, "The drive was late: mend it.; Look for a loose contact; Spikes in pressure"),
     ],
 )
 def test_the_page_of_every_verdict_says_what_to_do(run: Path, kind: str, change: dict[str, Any], words: str) -> None:
@@ -111,7 +134,7 @@ def test_add_fits_an_effect_and_says_whether_the_data_bear_it_out(
     assert done["verdict"]["kind"] == "confirmed"
     assert [r["name"] for r in done["records"] if r["role"] == "validation"]
     assert_cannot_inject(json.loads((tmp_path / "right" / "add.json").read_text()))
-    assert done["residual"]["after"]["validation"] < 0.2 * done["residual"]["before"]["validation"]
+    assert done["residual"]["after"]["validation"] < 1.05 < 1.5 < done["residual"]["before"]["validation"]
     assert "valve_deadband" in load_model(tmp_path / "right" / "model.yaml").effects
     assert add_main(["no_such_effect", *command, "--out", str(tmp_path / "none")]) == 2
     assert "no_such_effect" in capsys.readouterr().err

@@ -20,7 +20,7 @@ from hydraulic_sysid.data.records import Record
 
 from .errors import CalibrationError
 from .levenberg_marquardt import Minimum, NormalEquations, minimise
-from .parameters import Parameters
+from .parameters import NO_PRIORS, Parameters, Priors
 from .projection import Projection
 from .segments import Segments, cut
 from .shooting import Shooting
@@ -57,10 +57,17 @@ class FitPoint:
     robust: bool = False
 
     @classmethod
-    def begin(cls, plant: Plant, segments: Sequence[Segments], keys: Sequence[str], robust: bool = False) -> FitPoint:
+    def begin(
+        cls,
+        plant: Plant,
+        segments: Sequence[Segments],
+        keys: Sequence[str],
+        robust: bool = False,
+        priors: Priors = NO_PRIORS,
+    ) -> FitPoint:
         """A model as it is, initial states moved once to where they fit best."""
         shooting = Shooting(plant, segments)
-        point = cls(shooting, Parameters.of(plant.model, keys), shooting.initial_states, [], robust)
+        point = cls(shooting, Parameters.of(plant.model, keys, priors), shooting.initial_states, [], robust)
         if any(s.unmeasured_pressures.any() for s in segments):
             raw = shooting.residuals(point.plant, shooting.initial_states)
             shooting = replace(shooting, misfit=_misfit(segments, raw))
@@ -74,19 +81,21 @@ class FitPoint:
     @cached_property
     def cost(self) -> float:
         """Sum of squared residuals over noise, or what a robust loss makes of them."""
-        return float(sum(np.sum(loss(p.residual, self.robust)) for p in self.projections))
+        squares = sum(np.sum(loss(p.residual, self.robust)) for p in self.projections)
+        return float(squares) + self.parameters.prior_cost
 
     @cached_property
     def normal(self) -> NormalEquations:
         """With the initial states eliminated."""
-        information = np.zeros((len(self.parameters), len(self.parameters)))
+        information = np.diag(self.parameters.prior_information)
         scores = []
-        for p, beyond in zip(self.projections, self.beyond(self.columns()), strict=True):
+        for p, beyond in zip(self.projections, self.beyond(self.columns), strict=True):
             weighted = beyond * _weights(p.residual, self.robust)[..., None]
             information += np.tensordot(weighted, beyond, axes=([0, 1], [0, 1]))
             scores.append(np.einsum("smp,sm->sp", weighted, p.residual))
-        return NormalEquations(information, tuple(scores))
+        return NormalEquations(information, tuple(scores), self.parameters.prior_gradient)
 
+    @cached_property
     def columns(self) -> list[Array]:
         """Derivatives (S, m, P) of the residuals by the parameters over their scales, per record."""
         return self.shooting.jacobian(
@@ -97,15 +106,26 @@ class FitPoint:
         """What of them the initial states cannot explain."""
         return [p.beyond(c) for p, c in zip(self.projections, columns, strict=True)]
 
-    def settled(self, shooting: Shooting, parameters: Parameters) -> FitPoint:
-        """Other parameters, or another weight of the priors; initial states moved to where they then fit best."""
+    def settled(
+        self, shooting: Shooting, parameters: Parameters, initial_states: Sequence[Array] | None = None
+    ) -> FitPoint:
+        """Other parameters, or another weight of the priors; initial states moved to where they then fit best.
+
+        :param initial_states: from where they are moved; by default those of this point
+        """
         plant = shooting.plant.with_parameters(parameters.by_key)
-        return FitPoint(shooting, parameters, *shooting.settled(plant, self.initial_states), self.robust)
+        states = shooting.settled(plant, self.initial_states if initial_states is None else initial_states)
+        return FitPoint(shooting, parameters, *states, self.robust)
 
     def moved(self, change: Array) -> FitPoint | None:
-        """A change (P,) of the parameters away; None where the plant does not run there."""
+        """A change (P,) of the parameters away; None where the plant does not run there.
+
+        Initial states begin where they will fit best, to first order.
+        """
+        ahead = [p.raw + c @ change for p, c in zip(self.projections, self.columns, strict=True)]
+        states = self.shooting.corrected(self.initial_states, self.projections, ahead)
         try:
-            return self.settled(self.shooting, self.parameters.moved(change))
+            return self.settled(self.shooting, self.parameters.moved(change), states)
         except SimulationError:
             return None
 
@@ -175,7 +195,7 @@ class Fit:
     @property
     def _freedom(self) -> int:
         """Each initial state takes one degree of freedom, and its prior gives it back."""
-        measured = sum(s.measured.size for s in self.point.shooting.segments)
+        measured = sum(int(s.counted.sum()) for s in self.point.shooting.segments)
         return max(measured - len(self.point.parameters), 1)
 
 
@@ -204,15 +224,16 @@ def fit_segments(
     keys: Sequence[str],
     settings: FitSettings,
     progress: Callable[[int, float], None] | None = None,
+    priors: Priors = NO_PRIORS,
 ) -> Fit:
-    """As `fit`, to segments that were cut before."""
+    """As `fit`, to segments that were cut before, with what is known of parameters beforehand."""
 
     def accepted(number: int, point: FitPoint) -> FitPoint:
         if progress is not None:
             progress(number, float(np.sqrt(point.cost / max(sum(p.raw.size for p in point.projections), 1))))
         return point.reweighted()
 
-    begin = FitPoint.begin(plant, segments, keys, settings.robust)
+    begin = FitPoint.begin(plant, segments, keys, settings.robust, priors)
     if not keys:
         return Fit(begin.at_rest(), True, 0)
     found: Minimum[FitPoint] = minimise(
@@ -240,4 +261,4 @@ def _weights(residual: Array, robust: bool) -> Array:
 def _misfit(segments: Sequence[Segments], residuals: Sequence[Array]) -> float:
     """How many times the noise the model is off, at least 1."""
     squares = sum(float(np.sum(s.by_channel(r) ** 2)) for s, r in zip(segments, residuals, strict=True))
-    return max(1.0, float(np.sqrt(squares / sum(s.measured.size for s in segments))))
+    return max(1.0, float(np.sqrt(squares / sum(int(s.counted.sum()) for s in segments))))

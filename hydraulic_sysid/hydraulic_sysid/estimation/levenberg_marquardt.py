@@ -32,15 +32,19 @@ class NormalEquations:
 
     information: Array
     scores: tuple[Array, ...]
+    prior_gradient: Array | float = 0.0
+    """(P,) of what is known beforehand; ``information`` has its part in it."""
 
     @cached_property
     def gradient(self) -> Array:
-        """(P,) Σ Jᵀr."""
-        return np.concatenate(self.scores).sum(axis=0)
+        """(P,) Σ Jᵀr, and that of the prior."""
+        return np.concatenate(self.scores).sum(axis=0) + self.prior_gradient
 
     def subset(self, chosen: Index) -> NormalEquations:
         """Of the ``chosen`` parameters alone, the others being held."""
-        return NormalEquations(self.information[np.ix_(chosen, chosen)], tuple(s[:, chosen] for s in self.scores))
+        prior = self.prior_gradient if isinstance(self.prior_gradient, float) else self.prior_gradient[chosen]
+        scores = tuple(s[:, chosen] for s in self.scores)
+        return NormalEquations(self.information[np.ix_(chosen, chosen)], scores, prior)
 
     def reduction(self, change: Array) -> float:
         """By how much a change (P,) of the parameters lowers the sum of squares, to first order of the residuals."""

@@ -15,14 +15,19 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.ndimage import median_filter
 from scipy.special import comb
 from scipy.stats import chi2
 
-from hydraulic_sim.arrays import Array
+from hydraulic_sim.arrays import Array, Mask
 
 METHOD = "median over blocks of the mean square of fourth differences (white noise), at least LSB/√12"
 _ORDER = 4
 _BLOCK = 100
+_AROUND = 101  # samples over which the scale of differences is taken
+_MEDIAN = 0.6745  # of normal noise: the median of its size over its standard deviation
+_STANDS_OUT = 12.0  # standard deviations
+_AGREE = 0.3  # of the distance of a spike from its neighbours: what they may differ by
 
 
 def resolution(signal: ArrayLike) -> float:
@@ -74,6 +79,29 @@ def robust_noise_std(signal: ArrayLike) -> float:
     """
     y = _checked(signal)
     return float(max(np.sqrt(np.median(_squares(y)) / chi2.median(1)), resolution(y) / np.sqrt(12.0)))
+
+
+def spikes(signal: ArrayLike) -> Mask:
+    """Which samples (N,) stand alone, far off their neighbours: a loose contact, a converter, a lost frame.
+
+    Each is compared with the two on either side, which must agree among each other, on the scale of what such
+    differences are nearby. Fast motion may look alike: whoever has a model looks again.
+    """
+    y = _checked(signal)
+    beside = np.stack([y[:-4], y[1:-3], y[3:-1], y[4:]])
+    off, spread = np.zeros(y.size), np.zeros(y.size)
+    off[2:-2] = np.abs(y[2:-2] - np.median(beside, axis=0))
+    spread[2:-2] = np.ptp(beside, axis=0)
+    scale = np.maximum(median_filter(off, _AROUND), float(np.median(off))) / _MEDIAN
+    return (off > _STANDS_OUT * np.maximum(scale, resolution(y))) & (spread < _AGREE * off)
+
+
+def without(signal: Array, outliers: Mask) -> Array:
+    """A signal (N,), those samples on the straight line between their neighbours."""
+    if not outliers.any():
+        return signal
+    number = np.arange(signal.size)
+    return np.interp(number, number[~outliers], signal[~outliers])
 
 
 def _checked(signal: ArrayLike) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,9 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.model import Model
 
+Priors = Mapping[str, tuple[float, float]]
+"""What is known of parameters beforehand: key → mean and standard deviation [SI]."""
+NO_PRIORS: Priors = {}
 _SCATTER = 2.0  # factor by which a plant may be off a data sheet that states no bounds
 _AT_BOUND = 1e-6  # distance from a bound, of the scale
 
@@ -39,38 +42,68 @@ def bounded(model: Model) -> Model:
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters of a fit: ``values``, ``scales``, ``low`` and ``high`` bounds, each (P,), physical ones in SI."""
+    """Parameters of a fit: ``values``, ``scales``, ``low`` and ``high`` bounds, each (P,), physical ones in SI.
+
+    What is known beforehand: normal priors around ``mean`` with ``std`` (P,), infinite where nothing is.
+    """
 
     keys: tuple[str, ...]
     values: Array
     scales: Array
     low: Array
     high: Array
+    mean: Array
+    std: Array
 
     @classmethod
-    def of(cls, model: Model, keys: Iterable[str]) -> Parameters:
+    def of(cls, model: Model, keys: Iterable[str], priors: Priors = NO_PRIORS) -> Parameters:
         """Parameters of a model as they are, within the model's bounds."""
         keys = tuple(keys)
         low, high = np.array([model.entry(k).bounds for k in keys], dtype=float).reshape(-1, 2).T
         values = np.array([model.value(k) for k in keys], dtype=float)
-        return cls(keys, values, np.array([scale(model, k) for k in keys], dtype=float), low, high)
+        known = np.array([priors.get(k, (0.0, np.inf)) for k in keys], dtype=float).reshape(-1, 2)
+        return cls(keys, values, np.array([scale(model, k) for k in keys], dtype=float), low, high, *known.T)
 
     @classmethod
     def unbounded(cls, values: Array) -> Parameters:
         """Numbers that may be anything, of scale one."""
         infinite = np.full(values.size, np.inf)
-        return cls(tuple(map(str, range(values.size))), values, np.ones(values.size), -infinite, infinite)
+        names = tuple(map(str, range(values.size)))
+        return cls(names, values, np.ones(values.size), -infinite, infinite, values, infinite)
 
     def __len__(self) -> int:
         return len(self.keys)
 
     def __add__(self, other: Parameters) -> Parameters:
-        mine, others = ((p.values, p.scales, p.low, p.high) for p in (self, other))
-        return Parameters(self.keys + other.keys, *(np.concatenate(pair) for pair in zip(mine, others, strict=True)))
+        pairs = zip(self._arrays, other._arrays, strict=True)
+        return Parameters(self.keys + other.keys, *(np.concatenate(pair) for pair in pairs))
 
     def after(self, first: int) -> Parameters:
         """Without the ``first`` ones."""
-        return Parameters(self.keys[first:], *(a[first:] for a in (self.values, self.scales, self.low, self.high)))
+        return Parameters(self.keys[first:], *(a[first:] for a in self._arrays))
+
+    def first(self, number: int) -> Parameters:
+        """The first ones alone."""
+        return Parameters(self.keys[:number], *(a[:number] for a in self._arrays))
+
+    @property
+    def _arrays(self) -> tuple[Array, ...]:
+        return self.values, self.scales, self.low, self.high, self.mean, self.std
+
+    @property
+    def prior_cost(self) -> float:
+        """Sum of squared distances from what is known beforehand, over its standard deviations."""
+        return float(np.sum(((self.values - self.mean) / self.std) ** 2))
+
+    @property
+    def prior_gradient(self) -> Array:
+        """(P,) half the derivative of `prior_cost` by the values over their scales."""
+        return (self.values - self.mean) / self.std**2 * self.scales
+
+    @property
+    def prior_information(self) -> Array:
+        """(P,) half the second derivative."""
+        return (self.scales / self.std) ** 2
 
     @property
     def by_key(self) -> dict[str, float]:

@@ -21,22 +21,35 @@ def project_out(basis: Array, values: Array) -> Array:
 
 @dataclass(frozen=True)
 class Projection:
-    """Residuals of one record's segments, the initial states eliminated.
+    """Residuals of one record's segments, the initial states and the nuisance eliminated.
 
-    ``raw`` (S, m): measured − simulated in units of the noise, priors of the initial states appended; ``basis``
-    (S, m, F) orthonormal columns of what the initial states can explain; ``correction`` (S, F, m) the change of the
-    initial states that a residual asks for.
+    ``raw`` (S, m): measured − simulated, whitened, priors of the initial states appended; ``basis`` (S, m, F)
+    orthonormal columns, of which the share ``taken`` (S, F) is explained: all of what the initial states can, less of
+    what is bound by a prior; ``correction`` (S, free, m) the change of the initial states that a residual asks for.
     """
 
     raw: Array
     basis: Array
+    taken: Array
     correction: Array
 
     @classmethod
-    def of(cls, raw: Array, jacobian: Array) -> Projection:
-        """From the residuals and their derivatives (S, m, F) by the initial states."""
-        basis, triangle = np.linalg.qr(jacobian)
-        return cls(raw, basis, -np.linalg.solve(triangle, np.swapaxes(basis, -1, -2)))
+    def of(cls, raw: Array, jacobian: Array, nuisance: Array) -> Projection:
+        """From the residuals, their derivatives (S, m, free) by the initial states, and nuisance (S, m, K).
+
+        Coefficients of the nuisance have unit variance: with B = (jacobian, nuisance) and the ridge Λ = diag(0, 1) the
+        residual's covariance is I + BΛ⁻¹Bᵀ, and what is left of r is (I − B(BᵀB + Λ)⁻¹Bᵀ)^½ r.
+        """
+        columns, free = np.concatenate((jacobian, nuisance), axis=-1), jacobian.shape[-1]
+        ridge = np.where(np.arange(columns.shape[-1]) < free, 0.0, 1.0)
+        gram = np.swapaxes(columns, -1, -2) @ columns + np.diag(ridge + 1e-12)
+        root = np.linalg.cholesky(gram)
+        whole = np.swapaxes(np.linalg.solve(root, np.swapaxes(columns, -1, -2)), -1, -2)
+        size, turn = np.linalg.eigh(np.swapaxes(whole, -1, -2) @ whole)
+        size = np.clip(size, 1e-15, 1.0)
+        basis = (whole @ turn) / np.sqrt(size)[:, None, :]
+        correction = -np.linalg.solve(np.swapaxes(root, -1, -2), np.swapaxes(whole, -1, -2))[:, :free]
+        return cls(raw, basis, 1.0 - np.sqrt(1.0 - size), correction)
 
     @cached_property
     def residual(self) -> Array:
@@ -44,9 +57,13 @@ class Projection:
         return self.beyond(self.raw[..., None])[..., 0]
 
     def beyond(self, columns: Array) -> Array:
-        """What of (S, m, P) the initial states cannot explain."""
-        return project_out(self.basis, columns)
+        """What of (S, m, P) the initial states and the nuisance cannot explain."""
+        return columns - self.basis @ (self.taken[..., None] * (np.swapaxes(self.basis, -1, -2) @ columns))
+
+    def with_raw(self, raw: Array) -> Projection:
+        """Other residuals (S, m), the same directions."""
+        return Projection(raw, self.basis, self.taken, self.correction)
 
     def subset(self, chosen: Mask) -> Projection:
         """Of the ``chosen`` (S,) segments alone."""
-        return Projection(self.raw[chosen], self.basis[chosen], self.correction[chosen])
+        return Projection(self.raw[chosen], self.basis[chosen], self.taken[chosen], self.correction[chosen])

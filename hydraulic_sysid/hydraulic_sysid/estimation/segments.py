@@ -7,8 +7,9 @@ the parameters (Bock 1987, multiple shooting; here without continuity between se
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -18,7 +19,9 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 
 from .errors import SegmentError
-from .noise import noise_std, robust_noise_std
+from .noise import noise_std, robust_noise_std, spikes, without
+from .noise_model import ChannelNoise
+from .recording import Timing
 from .velocity_filter import VelocityFilter
 
 MEASURED = ("position", "pressure_a", "pressure_b")
@@ -32,35 +35,97 @@ _STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
 _PRIOR = {"position": 1000.0, "pressure_a": 200.0, "pressure_b": 200.0}
 _UNMEASURED_PRESSURE = 2e6  # Pa
 _VELOCITY = 0.2  # m/s
+_SETTLING = 0.1  # s of a record after which states that no sensor sees have forgotten what they began with
 _NUMERICAL = 1e-6  # of a channel's range: a noise-free record is not held to less
+_LEAST_NOISE = float(np.finfo(float).tiny) ** 0.5  # of a channel that stands still: its square must not vanish
 
 
 @dataclass(frozen=True)
 class Segments:
     """The segments of one record.
 
-    ``first`` (S,) sample indices, ``samples`` per segment; ``measured`` (S, samples, C) in units of ``noise_std`` (C,);
-    ``smoothed`` (N, 4) position, velocity and pressures of the whole record, NaN where they were not measured; ``free``
-    the indices of the states that are estimated, F of them, and ``prior_std`` (F,) how far each may be off [the state's
-    unit].
+    ``first`` (S,) sample indices, ``samples`` per segment; ``measured`` (S, samples, C) [SI] with the ``noise`` of each
+    channel; ``smoothed`` (N, 4) position, velocity and pressures of the whole record, NaN where they were not measured;
+    ``free`` the indices of the states that are estimated, F of them, and ``prior_std`` (F,) how far each may be off
+    [the state's unit]; ``timing``: how the channels were recorded; ``hum``: mains lines [Hz] in each; ``outliers``
+    (S, samples, C): samples that do not count; ``nuisance`` (S, samples·C, K), whitened: what may be off in every
+    segment by about one of each column, such as hum and laws that are not quite those of the bench; ``disturbance``
+    (S, samples, C, D) [SI]: what else may be, known from before.
     """
 
     record: Record
     first: Index
     samples: int
     channels: tuple[str, ...]
-    noise_std: Array
+    noise: tuple[ChannelNoise, ...]
     measured: Array
     smoothed: Array
     free: Index
     prior_std: Array
+    timing: tuple[Timing, ...]
+    hum: tuple[tuple[float, ...], ...]
+    outliers: Mask
+    nuisance: Array
+    disturbance: Array
 
     def __len__(self) -> int:
         return len(self.first)
 
     def subset(self, chosen: Mask) -> Segments:
         """Those segments that are ``chosen`` (S,)."""
-        return replace(self, first=self.first[chosen], measured=self.measured[chosen])
+        return replace(
+            self,
+            first=self.first[chosen],
+            measured=self.measured[chosen],
+            outliers=self.outliers[chosen],
+            nuisance=self.nuisance[chosen],
+            disturbance=self.disturbance[chosen],
+        )
+
+    @property
+    def noise_std(self) -> Array:
+        """(C,) of each channel, its colour included [SI]."""
+        return np.array([n.std for n in self.noise])
+
+    @property
+    def states(self) -> list[int]:
+        """(C,) which state each channel measures."""
+        return [_STATES.index(c) for c in self.channels]
+
+    @cached_property
+    def _missing(self) -> list[list[tuple[int, Array]]]:
+        return [noise.missing(self.outliers[:, :, c]) for c, noise in enumerate(self.noise)]
+
+    @property
+    def counted(self) -> Index:
+        """(S,) how many measured values count in each segment."""
+        return np.sum(~self.outliers, axis=(1, 2))
+
+    def deviation(self, run: Array, priors: Array) -> Array:
+        """(S, m) measured − what a simulated ``run`` (S, samples, C) looks like in the record, whitened.
+
+        The ``priors`` of the initial states, or residuals that end with them, are appended.
+        """
+        left = self.whitened(self.measured - self.recorded(run))
+        return np.concatenate((left, priors[:, -len(self.free) :]), axis=1)
+
+    def recorded(self, run: Array) -> Array:
+        """(S, samples, C) what a simulated ``run`` of that shape looks like in the record [SI]."""
+        return np.stack([t.applied(run[..., c], self.record.dt) for c, t in enumerate(self.timing)], axis=-1)
+
+    def whitened(self, values: Array) -> Array:
+        """(S, samples, C, …) in units of the noise and without its colour, channel by channel: (S, samples·C, …)."""
+        found = []
+        for c, noise in enumerate(self.noise):
+            own = values[:, :, c]
+            if self._missing[c]:
+                out = self.outliers[:, :, c]
+                own = np.where(out.reshape(out.shape + (1,) * (own.ndim - 2)), 0.0, own)
+            white = noise.whiten(own)
+            for row, basis in self._missing[c]:
+                white[row] -= np.tensordot(basis, np.tensordot(basis, white[row], axes=(0, 0)), axes=(1, 0))
+            found.append(white)
+        return np.stack(found, axis=2).reshape(len(values), -1, *values.shape[3:])
 
     def initial_states(self, plant: Plant) -> Array:
         """Where a plant's states begin (S, n_states): as measured, the rest at ease."""
@@ -77,22 +142,27 @@ class Segments:
         return states
 
     def by_channel(self, residual: Array) -> Array:
-        """Residuals (S, m) without the priors' part: (S, samples, C)."""
-        return residual[:, : -len(self.free)].reshape(len(self), self.samples, len(self.channels))
+        """Whitened residuals (S, m) without the priors' part: (S, samples, C)."""
+        return residual[:, : self.samples * len(self.channels)].reshape(len(self), self.samples, len(self.channels))
+
+    def in_units(self, residual: Array) -> Array:
+        """Whitened residuals (S, m) as deviations (S, samples, C) [SI], coloured as they were recorded."""
+        white = self.by_channel(residual)
+        return np.stack([n.colour(white[:, :, c]) for c, n in enumerate(self.noise)], axis=-1)
 
     @property
     def unmeasured_pressures(self) -> Mask:
         """(F,) which of the estimated states are pressures without a sensor."""
         return np.array([_STATES[k] not in (*self.channels, "velocity") for k in self.free])
 
-    def with_noise(self, noise_std: Array) -> Segments:
-        """The same, to be judged by another noise (C,)."""
-        ratio = self.noise_std / noise_std
+    def with_noise(self, noise: Sequence[ChannelNoise]) -> Segments:
+        """The same, to be judged by another noise of each channel, without nuisance."""
         prior = self.prior_std.copy()
         for place, index in enumerate(self.free):
             if _STATES[index] in self.channels:
-                prior[place] /= ratio[self.channels.index(_STATES[index])]
-        return replace(self, noise_std=noise_std, measured=self.measured * ratio, prior_std=prior)
+                channel = self.channels.index(_STATES[index])
+                prior[place] *= noise[channel].std / self.noise[channel].std
+        return replace(self, noise=tuple(noise), prior_std=prior, nuisance=self.nuisance[..., :0])
 
 
 def cut(records: Sequence[Record], kind: str, length: float, robust: bool = False) -> list[Segments]:
@@ -113,7 +183,8 @@ def _cut(record: Record, hydraulic: bool, length: float, robust: bool) -> Segmen
     if not length > 0.0:
         raise SegmentError(f"segments of {length:g} s: the length must be positive")
     # Neighbours share one sample, as a run of n intervals has n + 1 of them.
-    intervals = len(record) - 1
+    settling = round(_SETTLING / record.dt) if record.duration > 10.0 * _SETTLING else 0
+    intervals = len(record) - 1 - settling
     number = max(1, round(intervals * record.dt / length))
     samples = intervals // number + 1
     if samples < _FEWEST:
@@ -121,26 +192,33 @@ def _cut(record: Record, hydraulic: bool, length: float, robust: bool) -> Segmen
             f"{record.name}: segments of {length:g} s have {samples} samples of {record.dt:g} s; at least {_FEWEST} "
             f"are needed (the record has {len(record)})"
         )
-    first: Index = (samples - 1) * np.arange(number, dtype=np.int64)
+    first: Index = settling + (samples - 1) * np.arange(number, dtype=np.int64)
     channels = tuple(c for c in MEASURED if c in record and (hydraulic or c == "position"))
-    noise = np.array([_noise(record[c], robust) for c in channels])
+    alone = {c: spikes(record[c]) for c in channels}
+    signals = {c: without(record[c], alone[c]) for c in channels}
+    noise = tuple(ChannelNoise.white(_noise(signals[c], robust)) for c in channels)
     index = first[:, None] + np.arange(samples)
-    measured = np.stack([record[c][index] for c in channels], axis=-1) / noise
-    prior = {"velocity": _VELOCITY} | {c: _PRIOR[c] * sigma for c, sigma in zip(channels, noise, strict=True)}
+    measured = np.stack([record[c][index] for c in channels], axis=-1)
+    prior = {"velocity": _VELOCITY} | {c: _PRIOR[c] * n.std for c, n in zip(channels, noise, strict=True)}
     free = np.arange(len(_STATES) if hydraulic else 2)
     prior_std = np.array([prior.get(_STATES[k], _UNMEASURED_PRESSURE) for k in free])
-    return Segments(record, first, samples, channels, noise, measured, _smoothed(record, channels), free, prior_std)
+    return Segments(
+        record, first, samples, channels, noise, measured, _smoothed(record, signals), free, prior_std,
+        tuple(Timing() for _ in channels), tuple(() for _ in channels),
+        np.stack([alone[c][index] for c in channels], axis=-1), np.zeros((number, samples * len(channels), 0)),
+        np.zeros((*measured.shape, 0)),
+    )  # fmt: skip
 
 
 def _noise(values: Array, robust: bool) -> float:
     sigma = robust_noise_std(values) if robust else noise_std(values)
-    return max(sigma, _NUMERICAL * float(np.ptp(values)), np.finfo(float).tiny)
+    return max(sigma, _NUMERICAL * float(np.ptp(values)), _LEAST_NOISE)
 
 
-def _smoothed(record: Record, channels: tuple[str, ...]) -> Array:
+def _smoothed(record: Record, signals: Mapping[str, Array]) -> Array:
     """Measured values smoothed, the velocity by a derivative filter: (N, 4), NaN for what has no sensor."""
-    position = record["position"]
-    found = {c: savgol_filter(record[c], _SMOOTHING, 2) for c in channels}
+    position = signals["position"]
+    found = {c: savgol_filter(values, _SMOOTHING, 2) for c, values in signals.items()}
     found["velocity"] = VelocityFilter.for_signal(position, record.dt, noise_std(position))(position)
     missing = np.full(len(record), np.nan)
     return np.stack([found.get(name, missing) for name in _STATES], axis=-1)

@@ -20,11 +20,28 @@ from .segments import Segments
 
 T = TypeVar("T")
 
+_MOST_KNOWN = 256  # propagations along a record that are kept
 _STEP = 2e-3  # difference step of a parameter, of its value, …
 _LEAST_STEP = 0.1  # … or of so much of its scale
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel
 _VELOCITY_STEP = 1e-3  # m/s
 _PRESSURE_STEP = 1e5  # Pa, where the pressure is not measured
+
+
+@dataclass(frozen=True)
+class Inner:
+    """States of a plant that no sensor sees: their ``columns``, values (S, n_states) and the memories of its laws."""
+
+    columns: list[int]
+    values: Array
+    memories: Array | None
+
+    def into(self, states: Array) -> tuple[Array, Array | None]:
+        """These states (S, n_states) with the inner ones in their place."""
+        if self.columns:
+            states = states.copy()
+            states[:, self.columns] = self.values[:, self.columns]
+        return states, self.memories
 
 
 @dataclass(frozen=True)
@@ -38,6 +55,11 @@ class Shooting:
     plant: Plant
     segments: Sequence[Segments]
     misfit: float = 1.0
+
+    @cached_property
+    def _known(self) -> dict[tuple[int, tuple[float | str, ...]], Inner]:
+        """Inner states that follow from the drive alone, by record and path: most plants of a fit share them."""
+        return {}
 
     @cached_property
     def initial_states(self) -> list[Array]:
@@ -64,7 +86,7 @@ class Shooting:
         for old, new, raw, p in zip(initial_states, moved, self.residuals(plant, moved), before, strict=True):
             better = (np.sum(raw**2, axis=1) <= np.sum(p.raw**2, axis=1))[:, None]
             states.append(np.where(better, new, old))
-            projections.append(Projection(np.where(better, raw, p.raw), p.basis, p.correction))
+            projections.append(p.with_raw(np.where(better, raw, p.raw)))
         return states, projections
 
     def corrected(
@@ -101,28 +123,51 @@ class Shooting:
     def _map(self, function: Callable[..., T], items: Iterable) -> list[T]:
         return list(_workers(os.cpu_count() or 1).map(function, items))
 
-    def _residual(self, plant: Plant, i: int, states: Array) -> Array:
+    def _residual(self, plant: Plant, i: int, states: Array, inner: Inner | None = None) -> Array:
         segments = self.segments[i]
-        run = self._run(plant, segments, states)
-        simulated = np.stack([run[c] for c in segments.channels], axis=-1) / segments.noise_std
+        run = self._run(plant, i, states, inner)
         off = (self.initial_states[i] - states)[:, segments.free] / segments.prior_std
         off = np.where(segments.unmeasured_pressures, self.misfit * off, off)
-        return np.concatenate(((segments.measured - simulated).reshape(len(segments), -1), off), axis=1)
+        return segments.deviation(run, off)
 
-    def _run(self, plant: Plant, segments: Segments, states: Array) -> dict[str, Array]:
-        """The segments simulated; states that no sensor sees are propagated along the record up to each segment."""
-        drive, dt, memories = segments.record["drive"], segments.record.dt, None
-        if plant.has_inner_states:
-            tracked, memories = plant.track(drive, dt, segments.first, segments.smoothed)
-            measured = segments.smoothed.shape[1]
-            inner = [i for i, name in enumerate(plant.state_names) if i >= measured and name != "stick"]
-            states = states.copy()
-            states[:, inner] = tracked[:, inner]
-        return plant.predict(drive, dt, segments.first, segments.samples - 1, states, memories)
+    def simulated(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
+        """(S, samples, C) per record: the measured channels as they are in the plant [SI]."""
+        return self._map(lambda i: self._run(plant, i, initial_states[i]), range(len(self.segments)))
+
+    def driven(self, plant: Plant, i: int, initial_states: Array, drive: Array) -> Array:
+        """As `simulated` for record ``i`` alone, with another drive (N,) [V] within the segments."""
+        return self._run(plant, i, initial_states, drive=drive)
+
+    def _run(
+        self, plant: Plant, i: int, states: Array, inner: Inner | None = None, drive: Array | None = None
+    ) -> Array:
+        segments = self.segments[i]
+        states, memories = (inner or self._inner(plant, i)).into(states)
+        drive = segments.record["drive"] if drive is None else drive
+        run = plant.predict(drive, segments.record.dt, segments.first, segments.samples - 1, states, memories)
+        return np.stack([run[c] for c in segments.channels], axis=-1)
+
+    def _inner(self, plant: Plant, i: int) -> Inner:
+        """States that no sensor sees, propagated along the record up to each segment."""
+        if not plant.has_inner_states:
+            return Inner([], np.empty(0), None)
+        path = plant.drive_path
+        if path is not None and (i, path) in self._known:
+            return self._known[i, path]
+        segments = self.segments[i]
+        tracked, memories = plant.track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
+        measured = segments.smoothed.shape[1]
+        names = enumerate(plant.state_names)
+        found = Inner([k for k, name in names if k >= measured and name != "stick"], tracked, memories)
+        if path is not None:
+            if len(self._known) > _MOST_KNOWN:
+                self._known.clear()
+            self._known[i, path] = found
+        return found
 
     def _projection(self, plant: Plant, i: int, states: Array) -> Projection:
-        segments = self.segments[i]
-        base = self._residual(plant, i, states)
+        segments, inner = self.segments[i], self._inner(plant, i)
+        base = self._residual(plant, i, states, inner)
         jacobian = np.empty((*base.shape, len(segments.free)))
         for place, index in enumerate(segments.free):
             name = plant.state_names[index]
@@ -134,8 +179,9 @@ class Shooting:
                 step = _PRESSURE_STEP
             moved = states.copy()
             moved[:, index] += step
-            jacobian[..., place] = (self._residual(plant, i, moved) - base) / step
-        return Projection.of(base, jacobian)
+            jacobian[..., place] = (self._residual(plant, i, moved, inner) - base) / step
+        nuisance = np.pad(segments.nuisance, ((0, 0), (0, len(segments.free)), (0, 0)))
+        return Projection.of(base, jacobian, nuisance)
 
 
 @lru_cache(maxsize=4)

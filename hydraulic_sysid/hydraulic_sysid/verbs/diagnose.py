@@ -22,8 +22,8 @@ examples:
   python -m hydraulic_sysid diagnose --model sample_bench --record examples/sample_bench --out runs/diagnosed
   python -m hydraulic_sysid diagnose --model my.yaml --record a.csv b.csv --holdout c.csv --apply --out runs/mine
 
-exit codes: 0 nothing is missing, or what is missing was found and named; 1 something is left that was not named
-(outside the library, or effects that these data cannot tell apart); 2 unusable input
+exit codes: 0 nothing is missing, or what is missing or wrong was found and named; 1 something is left that was not
+named (outside the library, or effects that these data cannot tell apart); 2 unusable input
 """
 
 
@@ -47,4 +47,4 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     if done.alternatives:
         models |= {f"competing_{name}.yaml": done.model for name in verdict["effects"] if name not in done.alternatives}
     files = {name: partial(save_model, one) for name, one in models.items()}
-    return opt.Done(done.result, files, verdict["kind"] in ("missing", "complete"))
+    return opt.Done(done.result, files, verdict["kind"] in ("missing", "complete", "data sheet", "recording"))

@@ -24,6 +24,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant, Trajectory
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitPoint
+from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.segments import Segments, cut
 from hydraulic_sysid.estimation.shooting import Shooting
@@ -94,7 +95,7 @@ def as_record(name: str, run: Trajectory, dt: float, channels: Sequence[str], sp
 def segments(record: Record, kind: str, length: float, noise: Mapping[str, float]) -> Segments:
     """The record in segments, to be judged by the ``noise`` of its channels (the record itself has none)."""
     (found,) = cut([record], kind, length)
-    return found.with_noise(np.array([noise[c] for c in found.channels]))
+    return found.with_noise([ChannelNoise.white(noise[c]) for c in found.channels])
 
 
 def evidence(
@@ -111,7 +112,7 @@ def evidence(
         projections = shooting.projections(point.plant, shooting.initial_states)
         at = FitPoint(shooting, point.parameters, shooting.initial_states, projections)
         linear.append(projections[0])
-        columns.append(at.beyond(at.columns())[0].reshape(-1, len(point.parameters)))
+        columns.append(at.beyond(at.columns)[0].reshape(-1, len(point.parameters)))
     squares, gradients = {}, {}
     for t, r in chosen:
         apart = linear[r].beyond((linear[r].raw - linear[t].raw)[..., None]).ravel()

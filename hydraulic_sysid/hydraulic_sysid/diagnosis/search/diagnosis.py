@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from typing import Any
 
@@ -15,6 +15,7 @@ from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locat
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
+from .data_sheet import Deviation
 from .document import document, with_balances
 from .misfit import explained
 from .nonparametric_curves import nonparametric_curves
@@ -60,15 +61,22 @@ def diagnose(
     suspect = found.base if proxy else found.final
     curves = nonparametric_curves(suspect.linearisation, say) if outside else []
     known = parameter_errors(found.final.linearisation)
+    found = replace(found, moved=[with_error(d, known) for d in found.moved])
     whole = document(found, verdict, known, curves)
     done, alternatives = finished(found, known), verdicts.alternatives(found, verdict)
-    before, after = found.base.model, found.final.model if found.added else None
+    before, after = found.base.model, found.final.model if found.added or found.moved else None
     suspected = None if not outside else before if proxy else after
     del found, suspect  # their sensitivities would take up the memory that the balances need
     say("balances")
     rows, where = _balances(before, records, before is suspected)
     rows_after, where_after = _balances(after, records, after is suspected) if after else ([], [])
     return Diagnosis(done, alternatives, with_balances(whole, rows, rows_after, where or where_after))
+
+
+def with_error(deviation: Deviation, known: Mapping[str, Known]) -> Deviation:
+    """With the standard error that the parameters have, where the records determine the number."""
+    error = known[deviation.key].standard_error
+    return replace(deviation, standard_error=error) if math.isfinite(error) else deviation
 
 
 def finished(found: SearchResult, known: Mapping[str, Known]) -> Model:

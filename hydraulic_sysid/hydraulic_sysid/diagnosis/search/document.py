@@ -15,12 +15,14 @@ from .candidates import subsystem
 from .holdout import BLOCK, EVERY
 from .misfit import Misfit
 from .nonparametric_curves import NonparametricCurve
+from .remainder import remainders, spikes
 from .search import SearchResult
 from .uncertainty import Known
 from .verdict import MISSING, OUTSIDE, UNSEEN, Verdict
 from .worst_segments import worst_segments
 
 _NEAREST = 3
+MOST_PLACES = 50  # of spikes in a channel that are listed
 _CLEAR = 0.5  # share of what is left, from which a curve says where it is
 
 
@@ -87,6 +89,49 @@ def document(
             ]
             for name, every in verdict.competing.items()
         },
+        "data_sheet": [
+            {
+                "key": d.key,
+                "unit": result.model.parameter(d.key).unit,
+                "nominal": d.nominal,
+                "value": d.value,
+                "standard_error": d.standard_error,
+                "chi_square_difference": d.cost,
+                "instead": list(d.instead),
+            }
+            for d in result.moved
+        ],
+        "recording": {
+            "faults": [
+                {
+                    "name": f.hypothesis.name,
+                    "channels": list(f.hypothesis.channels),
+                    "size": f.size,
+                    "unit": "s",
+                    "standard_error": f.standard_error,
+                    "text": f.text,
+                    "remedy": f.hypothesis.remedy,
+                }
+                for f in result.faults
+            ],
+            "spikes": [
+                {
+                    "channel": s.channel,
+                    "count": s.count,
+                    "share": s.share,
+                    "places": [{"record": record, "time": time} for record, time in s.places[:MOST_PLACES]],
+                }
+                for s in spikes(result)
+            ],
+            "mains_lines": {
+                c: sorted({f for s in result.split.segments if c in s.channels for f in s.hum[s.channels.index(c)]})
+                for c in result.split.channels
+            },
+        },
+        "remainder": [
+            {"channel": r.channel, "beyond_noise": r.beyond, "noise": r.noise, "motion": r.motion, "share": r.share}
+            for r in remainders(result, final)
+        ],
         "parameters": _parameters(final.model, known, final.linearisation.parameters.keys),
         "unexplained_share": verdicts.unexplained_share(result),
         "nonparametric_curves": [_curve(c) for c in curves],

@@ -70,7 +70,7 @@ def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Seq
     values = np.array([start[k] for k in own])
     predicted = replace(predicted, values=np.clip(values, predicted.low, predicted.high))
     records = [model.parameter(k) for k in own]
-    before = sum(float(c[f].sum()) for c, f in zip(at.costs, at.split.fit, strict=True))
+    before = sum(float(c[f].sum()) for c, f in zip(at.costs, at.split.fit, strict=True)) + at.parameters.prior_cost
     found = None
     for share in _SHARES:
         tried = [
@@ -125,7 +125,12 @@ class FrozenPoint:
     @cached_property
     def cost(self) -> float:
         """Sum of squares of the segments for fitting."""
-        return sum(float(c[f].sum()) for c, f in zip(self.costs, self.linearisation.split.fit, strict=True))
+        squares = sum(float(c[f].sum()) for c, f in zip(self.costs, self.linearisation.split.fit, strict=True))
+        return squares + self._frozen.prior_cost
+
+    @property
+    def _frozen(self) -> Parameters:
+        return self.parameters.first(len(self.linearisation.parameters))
 
     @cached_property
     def own_columns(self) -> list[Array]:
@@ -138,7 +143,7 @@ class FrozenPoint:
     def normal(self) -> NormalEquations | None:
         """None where the candidate's parameters cannot be moved."""
         try:
-            return self.linearisation.bordered(self.own_columns, self.residual)
+            return self.linearisation.bordered(self.own_columns, self.residual, self._frozen)
         except SimulationError:
             return None
 

@@ -31,9 +31,19 @@ class Split:
         """The segments that a fit sees, without records of which it sees none."""
         return [s.subset(f) for s, f in zip(self.segments, self.fit, strict=True) if f.any()]
 
+    def some(self, most: int) -> list[Segments]:
+        """About ``most`` of those that a fit sees, spread over all records."""
+        every = max(1, round(sum(int(f.sum()) for f in self.fit) / most))
+        return [s.subset(np.arange(len(s)) % every == 0) for s in self.to_fit]
+
     def records(self, validation: bool = False) -> list[Record]:
         """Those of which at least a part is fitted, or those that are named for ``validation``."""
         return [s.record for s, f in zip(self.segments, self.fit, strict=True) if bool(f.any()) != validation]
+
+    def judged(self, segments: Sequence[Segments], usable: Sequence[Mask]) -> Split:
+        """The same roles for segments of which more is known, without those that are not ``usable[i]`` (S_i,)."""
+        kept = [s.subset(u) for s, u in zip(segments, usable, strict=True)]
+        return Split(kept, [f[u] for f, u in zip(self.fit, usable, strict=True)])
 
     @property
     def channels(self) -> list[str]:

@@ -13,7 +13,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
-from hydraulic_sysid.estimation.parameters import Parameters
+from hydraulic_sysid.estimation.parameters import NO_PRIORS, Parameters, Priors
 
 from .holdout import Split
 
@@ -33,11 +33,10 @@ class Linearisation:
     beyond: list[Array]
 
     @classmethod
-    def of(cls, model: Model, split: Split) -> Linearisation:
+    def of(cls, model: Model, split: Split, priors: Priors = NO_PRIORS) -> Linearisation:
         """Of a model that was fitted before."""
-        point = FitPoint.begin(Plant(model), split.segments, model.movable_keys()).at_rest()
-        columns = point.columns()
-        return cls(model, split, point, columns, point.beyond(columns))
+        point = FitPoint.begin(Plant(model), split.segments, model.movable_keys(), priors=priors).at_rest()
+        return cls(model, split, point, point.columns, point.beyond(point.columns))
 
     @property
     def parameters(self) -> Parameters:
@@ -62,19 +61,26 @@ class Linearisation:
             for b, r, chosen in zip(self.beyond, self.residual, self.split.fit, strict=True)
             if chosen.any()
         ]
-        return NormalEquations(self._inner(self.beyond, self.beyond), tuple(scores))
+        information = self._inner(self.beyond, self.beyond) + np.diag(self.parameters.prior_information)
+        return NormalEquations(information, tuple(scores), self.parameters.prior_gradient)
 
-    def bordered(self, columns: Sequence[Array], residual: Sequence[Array] | None = None) -> NormalEquations:
+    def bordered(
+        self,
+        columns: Sequence[Array],
+        residual: Sequence[Array] | None = None,
+        parameters: Parameters | None = None,
+    ) -> NormalEquations:
         """Of the parameters and, behind them, of what else changes the residuals by ``columns[i]`` (S, m, Q).
 
-        The gradient is that of ``residual[i]`` (S, m), by default that of the linearisation.
+        The gradient is that of ``residual[i]`` (S, m) at ``parameters``, by default that of the linearisation.
         """
         new = self.point.beyond(columns)
         cross = self._inner(self.beyond, new)
         left = [r[..., None] for r in (residual or self.residual)]
         gradient = np.concatenate((self._inner(self.beyond, left), self._inner(new, left)))
         own = self.normal.information
-        return NormalEquations(np.block([[own, cross], [cross.T, self._inner(new, new)]]), (gradient.T,))
+        prior = np.concatenate(((parameters or self.parameters).prior_gradient, np.zeros(new[0].shape[-1])))
+        return NormalEquations(np.block([[own, cross], [cross.T, self._inner(new, new)]]), (gradient.T,), prior)
 
     def changes(self, plants: Sequence[Plant]) -> list[Array]:
         """By how much (S, m, Q) the residuals change with each of these plants in the place of the model's.

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from hydraulic_sim.arrays import Array
 
@@ -11,6 +14,8 @@ from .holdout import Split
 
 SIGNIFICANT = 25.0  # reduction of the sum of squares, of the present variance, on segments for fitting …
 CONFIRMED = 10.0  # … and on those for validation
+WORST = 0.05  # of all segments, at least one, that do not count for whether something is missing at all
+BEST = 0.02  # of all segments, at least one, without which a reduction must be one, too
 VISIBLE = 5e-4  # over all residuals, of their present variance: a smaller one is a matter of laws, not of effects
 
 
@@ -22,6 +27,10 @@ class Misfit:
     validation: float
     n_fit: int
     n_validation: int
+    typical: float = math.inf
+    """Mean square over noise without the worst segments: no single one turns a verdict."""
+    by_segment: Array = field(default_factory=lambda: np.zeros(0), compare=False)
+    """Sum of squares of every segment."""
 
     @property
     def rms_fit(self) -> float:
@@ -62,17 +71,26 @@ class Misfit:
 def misfit(split: Split, costs: Sequence[Array]) -> Misfit:
     """Of the sums of squares ``costs[i]`` (S_i,); each initial state takes its degrees of freedom."""
     sums, counts = [0.0, 0.0], [0, 0]
-    for segments, fit, cost in zip(split.segments, split.fit, costs, strict=True):
+    cost, count = np.concatenate(list(costs)), np.concatenate([s.counted for s in split.segments])
+    kept = np.argsort(cost / count)[: max(1, cost.size - max(1, round(WORST * cost.size)))]
+    for segments, fit, own in zip(split.segments, split.fit, costs, strict=True):
         for i, part in enumerate((fit, ~fit)):
-            sums[i] += float(cost[part].sum())
-            counts[i] += int(part.sum()) * segments.samples * len(segments.channels)
-    return Misfit(sums[0], sums[1], counts[0], counts[1])
+            sums[i] += float(own[part].sum())
+            counts[i] += int(segments.counted[part].sum())
+    return Misfit(sums[0], sums[1], counts[0], counts[1], float(cost[kept].sum() / count[kept].sum()), cost)
 
 
 def material(before: Misfit, after: Misfit) -> bool:
-    """Whether a reduction is more than chance, more than fitting itself gives, and enough to be seen."""
+    """Whether a reduction is more than chance, more than fitting itself gives, and enough to be seen.
+
+    It must be so without the few segments that gain most, too.
+    """
     if before.total - after.total < before.least:
         return False
+    if before.by_segment.size and before.by_segment.size == after.by_segment.size:
+        gains = np.sort(before.by_segment - after.by_segment)
+        if gains[: gains.size - max(1, round(BEST * gains.size))].sum() < before.least:
+            return False
     held = not before.n_validation or before.validation - after.validation > CONFIRMED * before.variance
     return held and before.fit - after.fit > SIGNIFICANT * before.variance
 

@@ -74,7 +74,9 @@ def _predict(at: Linearisation, plant: Plant, effect: Effect, group: list[Probe]
     normal = normal.subset(np.concatenate((np.arange(own), own + usable)))
     # In units of the probes: 0 is the null value, 1 the probe.
     reach = np.array([_reach(effect, p) for p in group])
-    units = Parameters(tuple(p.moved for p in group), np.zeros(usable.size), np.ones(usable.size), *reach.T)
+    none, one = np.zeros(usable.size), np.ones(usable.size)
+    low, high = reach.T
+    units = Parameters(tuple(p.moved for p in group), none, one, low, high, none, np.inf * one)
     change = bounded_step(normal, at.parameters + units)
     alone = normal.subset(np.arange(own))
     gain = normal.reduction(change) - alone.reduction(bounded_step(alone, at.parameters))

@@ -19,13 +19,16 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
 from hydraulic_sysid.estimation.parameters import bounded
+from hydraulic_sysid.estimation.refinement import refined, usable
 
 from .candidates import candidates, observed, subsystem
+from .data_sheet import Deviation, priors, relaxed, restored, significant, suspects
 from .errors import DiagnosisError
 from .frozen_jacobian import Refit, as_it_is, refit
 from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import Misfit, explained, material, misfit
+from .recording_faults import RecordingFault, recording_faults, resized
 from .score_test import CandidateScore, score
 from .spectral_lines import record_features
 
@@ -42,6 +45,17 @@ NEEDED = 0.02  # of all that was explained, which an effect must explain beside 
 LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
 ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
+LOOSE = 1.1  # mean square over noise from which numbers of the data sheet are tried at all
+ENOUGH = 60  # segments, spread over all records, that do for a first fit
+FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
+SUSPECTS = 3  # numbers of the data sheet that are tried at once
+QUIETER = 0.95  # of the noise before: what was judged by that is judged again
+RETIMED = 0.1  # sampling intervals by which a channel is less late than before: the same
+MOST_FAULTS = 3  # of the recording
+MOST_SIZES = 4  # times that the size of a fault is sought again, …
+SAME_SIZE = 0.03  # … until it changes by no more than this share
+FAR_OFF = 4.0  # mean square over noise from which a fit need not be finished
+ROUNDS = 2  # of estimating the noise and fitting again
 NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing more is looked for
 EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
 MOST_SWAPS = 3
@@ -101,6 +115,8 @@ class SearchResult:
     final: SearchState
     misfits: dict[str, Misfit]
     competing: dict[str, SearchState]
+    moved: Sequence[Deviation] = ()
+    faults: Sequence[RecordingFault] = ()
 
     @property
     def added(self) -> list[str]:
@@ -113,6 +129,9 @@ class Search:
 
     def __init__(self, model: Model, split: Split, settings: FitSettings, say: Say) -> None:
         self.given, self.split, self.settings, self.say = model, split, settings, say
+        self.faults: list[RecordingFault] = []
+        self.priors = priors(model)
+        self._first = replace(settings, least_gain=FIRST_GAIN)
         self._last = replace(settings, most_steps=LAST_STEPS, least_gain=LAST_GAIN)
 
     @classmethod
@@ -132,17 +151,101 @@ class Search:
             raise DiagnosisError(str(error)) from None
 
     def begin(self) -> SearchState:
-        """The model as it was given, fitted."""
-        self.say("fitting the model as it is")
-        return self.state(self.given)
+        """The model, fitted and judged by the noise that it leaves; the data sheet is relaxed where that helps."""
+        self.say("fitting the model")
+        strict = self.judged(self.state(self.given, self._first))
+        if strict.misfit.variance < LOOSE:
+            return strict
+        self.say("fitting the model within the tolerances of its data sheet")
+        before, loose = self.split, self.state(relaxed(strict.model), self._last)
+        if material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER:
+            return self.judged(loose)
+        self.split = before
+        return strict
+
+    def judged(self, state: SearchState) -> SearchState:
+        """A state, judged by the noise that it shows itself."""
+        for _ in range(ROUNDS):
+            self.say("noise of the records")
+            at = state.linearisation
+            segments = refined(at.point, at.columns, self._laws(state.model))
+            self.split = self.split.judged(segments, usable(at.costs))
+            state = self.state(state.model, self._last if state.misfit.variance < FAR_OFF else self._first)
+        return state
+
+    def recorded(self, base: SearchState) -> SearchState:
+        """A state with its candidates explored, and with every fault of the recording that explains more than they."""
+        while base.misfit.variance - 1.0 > NOTHING_LEFT:
+            base = self.explore(base)
+            if len(self.faults) == MOST_FAULTS:
+                break
+            self.say("faults of the recording")
+            faults = recording_faults(base.linearisation)
+            best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
+            if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
+                break
+            self.say(f"fitting with: {faults[0].text}")
+            before = self.split
+            self.split = replace(self.split, segments=faults[0].applied(base.linearisation))
+            state = self.state(base.model, self._last)
+            if not material(base.misfit, state.misfit) or explained(base.misfit, state.misfit) < FURTHER:
+                self.split = before
+                break
+            self.faults.append(faults[0])
+            base = self.judged(self.resized(state, before))
+        return base
+
+    def resized(self, state: SearchState, without: Split) -> SearchState:
+        """A state that has the last fault named, fitted again while the fault's best size changes."""
+        for _ in range(MOST_SIZES):
+            old, new = self.faults[-1], resized(state.linearisation, self.faults[-1])
+            if abs(new.size - old.size) < max(SAME_SIZE * abs(old.size), 2.0 * new.standard_error):
+                break
+            self.faults[-1] = replace(new, reduction=old.reduction)
+            self.split = replace(self.split, segments=[new.hypothesis.applied(s, new.size) for s in without.segments])
+            state = self.state(state.model, self._last)
+        return state
+
+    def _laws(self, model: Model) -> list[str]:
+        """Parameters that stand for a law: the free ones, not the numbers that a data sheet states."""
+        return [k for k in model.free_keys() if "." in k or self.given.entry(k).free]
+
+    def concluded(self, found: SearchResult) -> SearchResult:
+        """With the data sheet as it was given, but for the few numbers that the records show to be wrong."""
+        base, final = found.base, found.final
+        if base.linearisation.parameters.keys == self.given.movable_keys():
+            return found
+        self.say("fitting with the data sheet as it is")
+        strict = self.state(restored(base.model, self.given, []), self._last)
+        strict = replace(strict, refits=base.refits, scores=base.scores)
+        done = strict if final is base else self.state(restored(final.model, self.given, []), self._last)
+        moved: list[Deviation] = []
+        while significant(done.misfit.total - final.misfit.total, final.misfit.count, final.misfit.variance):
+            named = [d.key for d in moved]
+            tried = []
+            for suspect in suspects(final.linearisation, self.given, named)[:SUSPECTS]:
+                self.say(f"fitting with another {suspect.key}")
+                state = self.state(restored(final.model, self.given, [*named, suspect.key]), self._last)
+                tried.append((state, replace(suspect, cost=done.misfit.total - state.misfit.total)))
+            best, deviation = min(tried, key=lambda t: t[0].misfit.total, default=(done, None))
+            if deviation is None or not significant(deviation.cost, best.misfit.count, best.misfit.variance):
+                break
+            moved, done = [*moved, replace(deviation, value=best.model.value(deviation.key))], best
+        misfits = found.misfits
+        if misfits:
+            misfits = {**misfits, next(reversed(misfits)): done.misfit}
+        return replace(found, base=strict, final=done, misfits=misfits, moved=tuple(moved))
 
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
         smooth, seen = model, _observed(model)
         for name in seen:
             smooth = smooth.without_effect(name)
-        done = fit_segments(Plant(smooth), self.split.to_fit, smooth.movable_keys(), settings or self.settings)
-        at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split)
+        segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
+        done = fit_segments(
+            Plant(smooth), segments, smooth.movable_keys(), settings or self.settings, priors=self.priors
+        )
+        at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors)
         if not seen:
             return SearchState(at.model, at, misfit(self.split, at.costs), at.residual)
         rounded = as_it_is(at, _with_values(model, at.model))
@@ -190,11 +293,29 @@ class Search:
         return min(found, key=lambda s: s.misfit.total, default=None)
 
     def run(self) -> SearchResult:
-        """Forward, backward, and every effect added against its competitors."""
-        base = self.explore(self.begin())
+        """Search until the noise by which it judged is the noise that its result leaves."""
+        found = self.forward(self.recorded(self.begin()))
+        if not found.added:
+            return self.concluded(found)
+        before = self.split
+        self.judged(self.state(found.final.model, self._last))
+        if not quieter(before, self.split) and not retimed(before, self.split):
+            self.split = before
+            return self.concluded(found)
+        self.say("searching on: what was taken for noise or small delays was partly what is missing")
+        base, tried = self.state(found.base.model, self._last), [r.name for r in found.base.refits[:LATER_REFITS]]
+        refits = [self.refit(base, s) for s in found.base.scores if s.effect.name in tried]
+        base = replace(base, refits=sorted(refits, key=lambda r: r.misfit.total), scores=found.base.scores)
+        return self.concluded(self.forward(base, self.state(found.final.model, self._last)))
+
+    def forward(self, base: SearchState, known: SearchState | None = None) -> SearchResult:
+        """Forward from the base or from what is ``known``, backward, and every effect added against its competitors."""
         path, added = [base], list[str]()
+        if known is not None:
+            added = [e for e in known.model.effects if e not in base.model.effects]
+            path.append(self.explore(known, most=LATER_REFITS) if known.misfit.variance - 1.0 > NOTHING_LEFT else known)
         while len(added) < MOST_EFFECTS:
-            better = self.finish(path[-1], partial(_worth, base, path[-1], added) if added else _anything)
+            better = self.finish(path[-1], partial(_worth, base, path[-1], added) if added else partial(_enough, base))
             if better is not None and not added:
                 # The fit with an effect may have gone on where that without it had stopped.
                 plain = self.state(better.model.without_effect(_new(better, base)), self._last)
@@ -209,13 +330,15 @@ class Search:
             path.append(better if nothing or last else self.explore(better, most=LATER_REFITS))
             if nothing:
                 break
-        misfits = {name: state.misfit for name, state in zip(added, path[1:], strict=True)}
-        final, competing = path[-1], {added[-1]: path[-2]} if added else {}
-        if len(added) > 1:
+        final, competing = path[-1], {added[-1]: path[-2]} if added and known is None else {}
+        misfits = {name: state.misfit for name, state in zip(added, path[1:], strict=False)}
+        if len(added) > 1 or known is not None:
             final, kept, competing = self._reviewed(base, final, added, competing)
-            if kept != added:
+            if kept != added or len(misfits) < len(kept):
                 misfits = self._misfits(base, final, kept)
-        return SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
+        return SearchResult(
+            self.given, self.split, self.settings, base, final, misfits, competing, faults=tuple(self.faults)
+        )
 
     def add(self, name: str) -> SearchResult:
         """One effect on top of the model, whatever it explains.
@@ -230,9 +353,11 @@ class Search:
             raise DiagnosisError(f"{name} changes nothing in these records: they do not excite it")
         tried = self.refit(base, scores[0])
         self.say(f"fitting with {name}")
-        final = self.state(tried.refit.model)
-        base = replace(base, refits=[tried], scores=scores)
-        return SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
+        # What the model without it left was no sure guide to noise and delays.
+        final = self.judged(self.state(tried.refit.model))
+        base = replace(self.state(base.model, self._last), refits=[tried], scores=scores)
+        found = SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
+        return self.concluded(found)
 
     def _reviewed(
         self, base: SearchState, state: SearchState, added: list[str], competing: dict[str, SearchState]
@@ -334,6 +459,29 @@ def _near(base: SearchState, without: SearchState, state: SearchState, name: str
     if explained(base.misfit, state.misfit) < HOPELESS:
         return replace(without, refits=[])
     return replace(without, refits=[r for r in without.others(name) if r.misfit.excess < left])
+
+
+def quieter(before: Split, after: Split) -> bool:
+    """Whether the noise of any channel has turned out to be clearly smaller."""
+    return any(
+        n.innovation < QUIETER * o.innovation
+        for new, old in zip(after.segments, before.segments, strict=True)
+        for n, o in zip(new.noise, old.noise, strict=True)
+    )
+
+
+def retimed(before: Split, after: Split) -> bool:
+    """Whether the small delay of any channel has turned out to be another: an effect may only have undone it."""
+    return any(
+        abs(n.delay - o.delay) > RETIMED * new.record.dt
+        for new, old in zip(after.segments, before.segments, strict=True)
+        for n, o in zip(new.timing, old.timing, strict=True)
+    )
+
+
+def _enough(base: SearchState, name: str, after: Misfit, part: float) -> bool:
+    """Whether a first effect explains a good part of what the model, within its tolerances, leaves."""
+    return explained(base.misfit, after) >= part * FURTHER
 
 
 def _anything(name: str, after: Misfit, part: float) -> bool:

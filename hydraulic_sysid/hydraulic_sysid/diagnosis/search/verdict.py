@@ -6,24 +6,31 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hydraulic_sim.model import Model
+from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
 from .nonparametric_curves import NonparametricCurve
+from .remainder import Remainder, negligible, remainders, spikes
 from .search import SearchResult
 
 MISSING = "missing"
 INDISTINGUISHABLE = "indistinguishable"
 COMPLETE = "complete"
+DATA_SHEET = "data sheet"
+RECORDING = "recording"
 OUTSIDE = "outside the library"
 
+MANY_SPIKES = 1e-4  # of all samples: more are a fault of the recording
+NO_EFFECT = "No effect of the library is missing."
 UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
 SMALL = 1.2  # mean square over noise below which more may be left …
 SMALL_UNEXPLAINED = 0.4  # … namely this share
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
+SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
 LARGE = 1.03  # residual over noise from which something is missing although no effect of the library is
 
 
@@ -97,12 +104,23 @@ def unexplained_share(result: SearchResult) -> float:
 def kind_of(result: SearchResult, tied: bool) -> str:
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added."""
     final = result.final.misfit
+    typical = min(final.variance, final.typical)
+    little = typical <= LARGE**2 or (typical <= SMALL and negligible(remainders(result, result.final)))
     if not result.added:
-        return OUTSIDE if final.variance > LARGE**2 else COMPLETE
+        if not little and unexplained_share(result) > UNEXPLAINED:
+            return OUTSIDE
+        return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
+    if little:
+        return INDISTINGUISHABLE if tied else MISSING
     allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if final.variance < SMALL else UNEXPLAINED
     if unexplained_share(result) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
     return INDISTINGUISHABLE if tied else MISSING
+
+
+def faulty(result: SearchResult) -> bool:
+    """Whether the recording, not the physics, is at fault."""
+    return bool(result.faults) or any(s.share > MANY_SPIKES for s in spikes(result))
 
 
 def strained(result: SearchResult) -> bool:
@@ -124,21 +142,28 @@ def place(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparametric
 def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
     """What a user reads first."""
     base, final = result.base.misfit.rms_validation, result.final.misfit.rms_validation
+    left = remainder_sentence(remainders(result, result.final))
     fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
     if verdict.kind == COMPLETE:
         return (
             f"Complete: on validation data the residual is {final:.3g} × noise, and no effect of the library lowers it "
-            "by more than chance."
+            f"by more than chance. {left}"
         )
+    if verdict.kind == RECORDING:
+        found = [*recording_sentences(result), *data_sheet_sentences(result)]
+        return " ".join(["Recording:", *found, fell, left, NO_EFFECT])
+    if verdict.kind == DATA_SHEET:
+        return " ".join(["Data sheet:", *data_sheet_sentences(result), fell, left, NO_EFFECT])
+    beside = [*data_sheet_sentences(result), *recording_sentences(result)]
     if verdict.kind == MISSING:
-        return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict)])
+        return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict), *beside])
     if verdict.kind == INDISTINGUISHABLE:
         parts = []
         for name in result.added:
             same = verdict.indistinguishable_from(name)
             parts.append(f"one of {{{', '.join([name, *same])}}}" if same else name)
         why = " Pressures would: without them these act alike on the position." if verdict.family else ""
-        return f"Missing: {_and(parts)}. These data cannot distinguish them. {fell}{why}"
+        return " ".join([f"Missing: {_and(parts)}. These data cannot distinguish them. {fell}{why}", *beside])
     text = "Outside the library: no effect of it explains what is left. "
     if result.added:
         text += f"The nearest is {_and(result.added)}. {fell} "
@@ -149,6 +174,41 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
         text += f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
     return text.strip()
+
+
+def remainder_sentence(found: Sequence[Remainder]) -> str:
+    """What the remainder means to somebody who uses the model."""
+    seen = [r for r in found if r.beyond > SEEN * r.noise]
+    if not seen:
+        return "Nothing remains beyond the noise."
+    sizes = _and([f"{quantity(r.beyond, UNITS[r.channel], 2)} of {TITLES[r.channel]}" for r in seen])
+    worst = max(r.share for r in seen)
+    return f"What remains beyond the noise is {sizes}, at most {percent(worst)} of the motion in a segment."
+
+
+def data_sheet_sentences(result: SearchResult) -> list[str]:
+    """What to correct in the model file, and what could be meant instead."""
+    found = []
+    for d in result.moved:
+        unit = result.model.parameter(d.key).unit
+        bounds = result.model.entry(d.key).bounds if result.model.entry(d.key).free else None
+        said = f"the {quantity(d.nominal, unit)} of the model file"
+        said = f"beyond its bound of {quantity(d.nominal, unit)}" if bounds else f"not {said}"
+        other = f" {_and(d.instead)} would explain the same: these data cannot distinguish them." if d.instead else ""
+        found.append(f"{d.key} is {quantity(d.value, unit, 4, error=d.standard_error)}, {said}.{other}")
+    return found
+
+
+def recording_sentences(result: SearchResult) -> list[str]:
+    """What is wrong in the records, and what to mend in the logger."""
+    found = [f"{fault.text}: {fault.hypothesis.remedy}." for fault in result.faults]
+    for s in spikes(result):
+        name, time = s.places[0]
+        found.append(
+            f"{s.count} samples of {TITLES[s.channel]} ({100.0 * s.share:.2g} %) are spikes, the first at {time:.4g} s "
+            f"of {name}; they are left out: look for a loose contact or a bad converter."
+        )
+    return found
 
 
 def imitated(records: Sequence[Record]) -> list[str]:

@@ -22,9 +22,9 @@ def worst_segments(result: SearchResult) -> list[dict[str, Any]]:
     rows = []
     for _, i, k in sorted(found, reverse=True)[:MOST]:
         segments = result.split.segments[i]
-        measured = segments.measured[k] * segments.noise_std
+        measured = segments.measured[k]
         before, after = (
-            measured - segments.by_channel(np.asarray(state.residual[i]))[k] * segments.noise_std
+            measured - segments.in_units(np.asarray(state.residual[i]))[k]
             for state in (result.base, result.final)
         )
         index = int(segments.first[k]) + np.arange(segments.samples)

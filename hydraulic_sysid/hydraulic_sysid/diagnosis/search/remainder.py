@@ -1,0 +1,79 @@
+"""What a model leaves, in the units of the sensors and of the motion: whether it matters to anybody."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .search import SearchResult, SearchState
+
+NEGLIGIBLE = 0.003  # of the motion in a segment: no law of a library is that of a bench to three parts in a thousand
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Of one channel, root mean squares [SI]: ``beyond`` the noise, of the noise and of the motion within segments."""
+
+    channel: str
+    beyond: float
+    noise: float
+    motion: float
+
+    @property
+    def share(self) -> float:
+        """Of the motion."""
+        return self.beyond / self.motion if self.motion > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Spikes:
+    """Samples of a channel that stand alone, far off the noise: how many, and where the first ones are."""
+
+    channel: str
+    count: int
+    share: float
+    places: list[tuple[str, float]]
+
+
+def remainders(result: SearchResult, state: SearchState) -> list[Remainder]:
+    """Per channel, over all records."""
+    squares = {c: np.zeros(3) for c in result.split.channels}
+    count = dict.fromkeys(squares, 0)
+    for segments, residual in zip(result.split.segments, state.residual, strict=True):
+        left = segments.in_units(np.asarray(residual))
+        moved = segments.measured - segments.measured.mean(axis=1, keepdims=True)
+        for c, channel in enumerate(segments.channels):
+            kept = ~segments.outliers[:, :, c]
+            noise = float(segments.noise_std[c])
+            sums = [np.sum(left[..., c][kept] ** 2), noise**2 * kept.sum(), np.sum(moved[..., c][kept] ** 2)]
+            squares[channel] += sums
+            count[channel] += int(kept.sum())
+    found = []
+    for channel, (left2, noise2, motion2) in squares.items():
+        number = max(count[channel], 1)
+        beyond = max(left2 - noise2, 0.0)
+        found.append(Remainder(channel, *(float(np.sqrt(s / number)) for s in (beyond, noise2, motion2))))
+    return found
+
+
+def negligible(found: list[Remainder]) -> bool:
+    """Whether what is left is below what any law of a library leaves."""
+    return bool(found) and all(r.share < NEGLIGIBLE for r in found)
+
+
+def spikes(result: SearchResult) -> list[Spikes]:
+    """Per channel that has some."""
+    found = []
+    for channel in result.split.channels:
+        places, total = list[tuple[str, float]](), 0
+        for s in result.split.segments:
+            if channel in s.channels:
+                out = s.outliers[:, :, s.channels.index(channel)]
+                total += out.size
+                rows, columns = np.nonzero(out)
+                index = np.unique(s.first[rows] + columns)
+                places += [(s.record.name, float(s.record.time[i])) for i in index]
+        if places:
+            found.append(Spikes(channel, len(places), len(places) / total, places))
+    return found

@@ -1,0 +1,176 @@
+"""Noise models of measured channels, and whitening with them.
+
+A channel's noise is autoregressive, e_t + a_1·e_{t−1} + … + a_p·e_{t−p} = w_t with white innovations w of standard
+deviation σ (Yule–Walker equations; Ljung, System Identification, ch. 4): filters, converters and what a transducer adds
+give it colour. Beside it stand spectral lines (mains) and outliers. The model is estimated from what a fitted plant
+leaves, on segments that are no worse than the quietest ones: noise is the same at rest and in motion, errors of a model
+are not.
+
+"1 × the noise" then is what an exact model leaves, whatever the sensors are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_toeplitz, solve_triangular, toeplitz
+from scipy.ndimage import median_filter
+from scipy.signal import lfilter, lfiltic, welch
+from scipy.stats import gamma
+
+from hydraulic_sim.arrays import Array, Mask
+
+ORDER = 12  # of the autoregression: two second-order filters and what hum and rounding add
+WINDOW = 128  # samples of a periodogram
+BAND = 60.0  # Hz, above which a residual is the sensor's own rather than an error of the model, …
+BAND_SHARE = 0.3  # … or this share of the Nyquist frequency where the sampling is slow
+CAP = 1.5  # of the largest power above: what noise may have below
+LOADING = 1e-5  # of the variance, added as a white part: no noise is without one, and no model exact below it
+QUIET = 0.2  # quantile of the segments' mean squares from which the noise is judged
+WITHIN = 3.5  # standard deviations of a mean square above which a segment holds more than noise
+OUTLIER = 6.0  # innovations' standard deviations
+MAINS = (50.0, 60.0)  # Hz
+HARMONICS = (1, 2, 3, 5)
+STANDS_OUT = 25.0  # power of a line over the median power around it
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Noise of one channel: ``coefficients`` (p + 1,) with a_0 = 1, ``innovation`` σ, ``autocovariance`` (p + 1,)."""
+
+    coefficients: Array
+    innovation: float
+    autocovariance: Array
+
+    @classmethod
+    def white(cls, std: float) -> ChannelNoise:
+        """White noise of a standard deviation."""
+        return cls(np.ones(1), std, np.array([std**2]))
+
+    @property
+    def std(self) -> float:
+        """Standard deviation, colour included."""
+        return float(np.sqrt(self.autocovariance[0]))
+
+    @property
+    def order(self) -> int:
+        """p, of the autoregression."""
+        return len(self.coefficients) - 1
+
+    @cached_property
+    def _root(self) -> Array:
+        """Cholesky factor of the covariance of the first p samples."""
+        return np.linalg.cholesky(toeplitz(self.autocovariance[: self.order]))
+
+    def whiten(self, values: Array) -> Array:
+        """(S, n, …) along the second axis, n > p: unit variance and no colour where ``values`` are this noise."""
+        if not self.order:
+            return values / self.innovation
+        white = values.copy()
+        for lag, coefficient in enumerate(self.coefficients[1:].tolist(), 1):
+            white[:, lag:] += coefficient * values[:, :-lag]
+        white /= self.innovation
+        head = np.moveaxis(values[:, : self.order], 1, 0)
+        first = solve_triangular(self._root, head.reshape(self.order, -1), lower=True)
+        white[:, : self.order] = np.moveaxis(first.reshape(head.shape), 0, 1)
+        return white
+
+    def missing(self, outliers: Mask) -> list[tuple[int, Array]]:
+        """What samples that do not count (S, n) could change: rows, and orthonormal whitened columns (n, G) of each."""
+        found = []
+        for row in np.flatnonzero(outliers.any(axis=1)).tolist():
+            samples = np.flatnonzero(outliers[row])
+            impulses = np.zeros((1, outliers.shape[1], samples.size))
+            impulses[0, samples, np.arange(samples.size)] = self.innovation
+            basis, _ = np.linalg.qr(self.whiten(impulses)[0])
+            found.append((row, basis))
+        return found
+
+    def colour(self, white: Array) -> Array:
+        """The inverse of `whiten` for (S, n)."""
+        if not self.order:
+            return white * self.innovation
+        values = np.empty_like(white)
+        p = self.order
+        values[:, :p] = white[:, :p] @ self._root.T
+        begin = np.stack([lfiltic([self.innovation], self.coefficients, row[p - 1 :: -1]) for row in values[:, :p]])
+        values[:, p:], _ = lfilter([self.innovation], self.coefficients, white[:, p:], axis=1, zi=begin)
+        return values
+
+
+def estimate(residuals: Sequence[Array], dt: float, order: int = ORDER) -> ChannelNoise:
+    """The noise in residuals (S_i, n_i) of one channel, one array per record, sampled every ``dt`` seconds.
+
+    A model's errors are slow and would pass for coloured noise. A sensor's noise is no stronger at low frequencies than
+    in the band above the plant's: what is, is capped.
+    """
+    squares = np.concatenate([np.mean(r**2, axis=1) for r in residuals])
+    length = float(np.mean([r.shape[1] for r in residuals]))
+    quiet = float(np.quantile(squares, QUIET))
+    kept = squares <= 4.0 * quiet
+    for _ in range(10):
+        covariance = _capped(_spectrum(residuals, kept), dt, order)
+        correlation = covariance / covariance[0]
+        scatter = float((2.0 * (1.0 + 2.0 * float(np.sum(correlation[1:] ** 2))) / length) ** 0.5)
+        # A segment's mean square is about a gamma variable; its quantile gives the mean, and that the limit.
+        mean = quiet / gamma.ppf(QUIET, scatter**-2, scale=scatter**2)
+        again = squares <= mean * (1.0 + WITHIN * scatter)
+        if np.array_equal(again, kept):
+            break
+        kept = again
+    coefficients = np.concatenate(([1.0], -solve_toeplitz(covariance[:-1], covariance[1:]))) if order else np.ones(1)
+    innovation = max(float(coefficients @ covariance), np.finfo(float).tiny) ** 0.5
+    return ChannelNoise(coefficients, innovation, covariance)
+
+
+def _spectrum(residuals: Sequence[Array], kept: Mask) -> Array:
+    """Two-sided power spectrum (F,) of the kept segments: its mean is their variance (Welch 1967)."""
+    total, count, begin = np.zeros(WINDOW // 2 + 1), 0, 0
+    for r in residuals:
+        chosen = r[kept[begin : begin + len(r)]]
+        begin += len(r)
+        length = min(WINDOW, r.shape[1])
+        if len(chosen):
+            _, power = welch(chosen, 1.0, "hann", length, nfft=WINDOW, detrend=False, scaling="density", axis=1)
+            total += power.sum(axis=0)
+            count += len(chosen)
+    one_sided = total / max(count, 1)
+    one_sided[1:-1] *= 0.5
+    return one_sided
+
+
+def _capped(spectrum: Array, dt: float, order: int) -> Array:
+    """Autocovariance (order + 1,) of a spectrum that is no higher below the band of sensors than within it."""
+    frequency = np.arange(spectrum.size) / (WINDOW * dt)
+    above = frequency >= min(BAND, BAND_SHARE * 0.5 / dt)
+    cap = CAP * float(spectrum[above].max())
+    found = np.fft.irfft(np.where(above, spectrum, np.minimum(spectrum, cap)))[: order + 1]
+    found[0] *= 1.0 + LOADING
+    return found
+
+
+def outliers(residuals: Array, noise: ChannelNoise) -> Mask:
+    """(S, n) which samples stand alone, far off the noise: spikes of a converter or a cable, not a model's error.
+
+    A model's error lasts; a spike does not, so that it stands out from the residuals beside it as well.
+    """
+    around = median_filter(np.abs(residuals), size=(1, 9))
+    return np.abs(residuals) > OUTLIER * np.maximum(noise.std, 3.0 * around)
+
+
+def mains_lines(residual: Array, dt: float) -> tuple[float, ...]:
+    """Frequencies [Hz] of mains and harmonics that stand out of a residual (N,) over a whole record."""
+    window = np.hanning(residual.size)
+    power = np.abs(np.fft.rfft((residual - residual.mean()) * window)) ** 2
+    frequency = np.fft.rfftfreq(residual.size, dt)
+    width = max(2.0 / (residual.size * dt), 0.2)
+    found = []
+    for line in (m * h for m in MAINS for h in HARMONICS):
+        off = np.abs(frequency - line)
+        at, beside = off <= width, (off > 2.0 * width) & (off <= 8.0)
+        if line < 0.45 / dt and at.any() and beside.any() and power[at].max() > STANDS_OUT * np.median(power[beside]):
+            found.append(line)
+    return tuple(found)

@@ -1,0 +1,162 @@
+"""What a fit teaches of the recording: noise with its colour, hum, outliers, channels that are late.
+
+A first fit takes the noise for white. What it leaves shows what the noise is; judged by that, the next fit leaves less
+of the model's own errors. Two rounds are enough: the noise hardly changes with the model once it is near.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array, Mask
+
+from . import noise_model
+from .covariance import inverse
+from .fit import FitPoint
+from .noise_model import ChannelNoise
+from .recording import Timing
+from .segments import Segments
+
+LATE = 0.35  # sampling intervals by which a channel may be late without being named
+LAW = 0.03  # share of itself by which every law may be off in a segment: no law is quite that of a bench
+TIMING = 0.3  # sampling intervals by which a channel may be late without further reason (order of conversion, filters)
+NEAR = 2.0  # residual over noise up to which a model says what delays there are
+HUM = 10.0  # standard deviations of the noise that a mains line may have in a segment
+SET_ASIDE = 10.0  # a segment whose cost is so many times that of nine in ten is left out
+
+
+def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) -> list[Segments]:
+    """The point's segments as what it leaves (residuals and parameter ``columns[i]`` (S, m, P)) shows them to be.
+
+    Noise, outliers, hum and delays are those of a channel in all records.
+
+    :param laws: parameters that stand for a law each, which may be off by `LAW` of itself in a segment
+    """
+    segments, projections = point.shooting.segments, point.projections
+    channels = list(dict.fromkeys(c for s in segments for c in s.channels))
+    left = [s.in_units(p.residual) for s, p in zip(segments, projections, strict=True)]
+    near = point.cost < NEAR**2 * sum(int(s.counted.sum()) for s in segments)
+    late = _delays(point, columns, channels) if near else {}
+    noise: dict[str, ChannelNoise] = {}
+    runs = point.shooting.simulated(point.plant, point.initial_states)
+    deviations = [np.abs(s.measured - s.recorded(run)) for s, run in zip(segments, runs, strict=True)]
+    spikes = [s.outliers.copy() for s in segments]
+    lines: dict[str, tuple[float, ...]] = {}
+    for channel in channels:
+        where = [(i, s.channels.index(channel)) for i, s in enumerate(segments) if channel in s.channels]
+        dt = segments[where[0][0]].record.dt
+        first = noise_model.estimate([left[i][:, :, c] for i, c in where], dt)
+        for i, c in where:
+            spikes[i][:, :, c] &= deviations[i][:, :, c] > noise_model.OUTLIER * first.std
+            spikes[i][:, :, c] |= noise_model.outliers(left[i][:, :, c], first)
+        cleaned = [np.where(spikes[i][:, :, c], 0.0, left[i][:, :, c]) for i, c in where]
+        known = {f for i, c in where for f in segments[i].hum[c]}
+        lines[channel] = tuple(known) or _lines([r[:, :-1].ravel() for r in cleaned], dt)
+        quiet = [_without(r, lines[channel], segments[i]) for r, (i, _) in zip(cleaned, where, strict=True)]
+        noise[channel] = noise_model.estimate(quiet, dt)
+    parameters = point.parameters
+    own = np.array([k in laws for k in parameters.keys], dtype=bool)
+    shares = np.where(own, parameters.values / parameters.scales * LAW, 0.0)
+    found = []
+    for i, s in enumerate(segments):
+        timing = tuple(replace(t, delay=late.get(c, t.delay)) for c, t in zip(s.channels, s.timing, strict=True))
+        judged = replace(s, outliers=spikes[i], timing=timing, hum=tuple(lines[c] for c in s.channels))
+        off = _raw_columns(s, columns[i], shares)
+        hum = _hum(s, [lines[c] for c in s.channels], [noise[c].std for c in s.channels])
+        judged = judged.with_noise([noise[c] for c in s.channels])
+        raw = np.concatenate((off, hum, _filter_states(s, timing), s.disturbance), axis=-1)
+        found.append(replace(judged, nuisance=judged.whitened(raw)))
+    return found
+
+
+def usable(costs: Sequence[Array]) -> list[Mask]:
+    """Which segments are not far off all others: (S,) per record, from the costs (S,) of a fit."""
+    most = SET_ASIDE * float(np.quantile(np.concatenate(costs), 0.9))
+    return [c <= most for c in costs]
+
+
+def _raw_columns(segments: Segments, columns: Array, shares: Array) -> Array:
+    """Whitened columns (S, m, P), each times its share, as deviations (S, samples, C, P) [SI]."""
+    if not np.any(shares):
+        return np.zeros((*segments.measured.shape, 0))
+    return np.stack([segments.in_units(columns[..., k] * share) for k, share in enumerate(shares) if share], axis=-1)
+
+
+def _rates(segments: Segments, raw: Array) -> Array:
+    """Change (S, samples, C, C) of what is recorded with the delay of each channel [1/s]."""
+    recorded = segments.measured - segments.in_units(raw)
+    rate = np.gradient(recorded, segments.record.dt, axis=1)
+    return rate[..., None] * np.eye(len(segments.channels))
+
+
+def _hum(segments: Segments, lines: Sequence[Sequence[float]], size: Sequence[float]) -> Array:
+    """Sine and cosine (S, samples, C, K) of every line of a channel, as large as hum may be."""
+    time = (segments.first[:, None] + np.arange(segments.samples)) * segments.record.dt
+    found = [np.zeros((*segments.measured.shape, 0))]
+    for c, (frequencies, std) in enumerate(zip(lines, size, strict=True)):
+        for f in frequencies:
+            for wave in (np.sin, np.cos):
+                column = np.zeros((*segments.measured.shape, 1))
+                column[:, :, c, 0] = HUM * std * wave(2.0 * np.pi * f * time)
+                found.append(column)
+    return np.concatenate(found, axis=-1)
+
+
+def _filter_states(segments: Segments, timing: Sequence[Timing]) -> Array:
+    """What a low pass remembers of before a segment (S, samples, C, K): it fades, as large as a channel may move."""
+    time = np.arange(segments.samples) * segments.record.dt
+    found = [np.zeros((*segments.measured.shape, 0))]
+    for c, one in enumerate(timing):
+        if one.lag > 0.0:
+            rate = float(np.std(np.gradient(segments.smoothed[:, segments.states[c]], segments.record.dt)))
+            column = np.zeros((*segments.measured.shape, 1))
+            column[:, :, c, 0] = one.lag * rate * np.exp(-time / one.lag)
+            found.append(column)
+    return np.concatenate(found, axis=-1)
+
+
+def _without(residual: Array, lines: Sequence[float], segments: Segments) -> Array:
+    """Residuals (S, samples) of one channel without their lines, segment by segment."""
+    if not lines:
+        return residual
+    time = (segments.first[:, None] + np.arange(segments.samples)) * segments.record.dt
+    waves = np.stack([w(2.0 * np.pi * f * time) for f in lines for w in (np.sin, np.cos)], axis=-1)
+    basis, _ = np.linalg.qr(waves)
+    return residual - (basis @ (np.swapaxes(basis, -1, -2) @ residual[..., None]))[..., 0]
+
+
+def _lines(residuals: Sequence[Array], dt: float) -> tuple[float, ...]:
+    """Lines that stand out in at least half of the records."""
+    found = [noise_model.mains_lines(r, dt) for r in residuals]
+    every = sorted({f for lines in found for f in lines})
+    return tuple(f for f in every if 2 * sum(f in lines for lines in found) >= len(found))
+
+
+def _delays(point: FitPoint, columns: Sequence[Array], channels: Sequence[str]) -> dict[str, float]:
+    """How late every channel was recorded [s]: one Gauss-Newton step beside the parameters, from what they are."""
+    segments = point.shooting.segments
+    count, new = len(point.parameters), len(channels)
+    information, gradient = np.zeros((count + new,) * 2), np.zeros(count + new)
+    for s, p, own in zip(segments, point.projections, columns, strict=True):
+        rate = s.whitened(_rates(s, p.raw))
+        placed = np.zeros((*p.raw.shape, new))
+        for c, channel in enumerate(s.channels):
+            placed[:, : rate.shape[1], channels.index(channel)] = rate[..., c] * s.record.dt
+        every = p.beyond(np.concatenate((own, placed), axis=-1))
+        information += np.tensordot(every, every, axes=([0, 1], [0, 1]))
+        gradient += np.tensordot(every, p.residual, axes=([0, 1], [0, 1]))
+    now = {c: t.delay / s.record.dt for s in segments for c, t in zip(s.channels, s.timing, strict=True)}
+    named = {c: t.named / s.record.dt for s in segments for c, t in zip(s.channels, s.timing, strict=True)}
+    dt = {c: s.record.dt for s in segments for c in s.channels}
+    late = np.arange(count, count + new)
+    off = np.array([now[c] - named[c] for c in channels])
+    information += np.diag(np.concatenate((point.parameters.prior_information, np.full(new, TIMING**-2))))
+    gradient += np.concatenate((point.parameters.prior_gradient, off * TIMING**-2))
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    cover = inverse(information / np.outer(scale, scale)) / np.outer(scale, scale)
+    step = np.clip(off - (cover @ gradient)[late], -LATE, LATE)
+    return {c: (named[c] + float(step[k])) * dt[c] for k, c in enumerate(channels)}
+

@@ -1,0 +1,129 @@
+"""What explains records whose physics is complete: nothing more, a number of the data sheet, or the recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from hostile_page import assert_cannot_inject
+from scipy.signal import butter, lfilter
+
+from hydraulic_sim.model import Model
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.results import plain
+from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose
+from hydraulic_sysid.report import render
+
+Array = np.ndarray
+
+DT, SECONDS = 1e-3, 4.0
+NOISE = {"position": 1e-5, "pressure_a": 1e4, "pressure_b": 1e4}
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    """Of the free parameters two are left, so that a search is short."""
+    bench = load_model("sample_bench")
+    for key in bench.free_keys():
+        if key not in ("valve_flow", "viscous_friction.coefficient"):
+            bench = bench.with_entry(key, free=False)
+    return bench
+
+
+@pytest.fixture(scope="module")
+def runs(model: Model) -> list[dict[str, Array]]:
+    """What the plant does in three experiments: steps, a slow sine, a chirp."""
+    return driven(model)
+
+
+def driven(model: Model) -> list[dict[str, Array]]:
+    plant, time = Plant(model), DT * np.arange(round(SECONDS / DT))
+    draw = np.random.default_rng(7)
+    drives = [
+        np.repeat(draw.uniform(-4.0, 4.0, 16), 250),
+        2.0 * np.sin(2.0 * np.pi * 0.5 * time),
+        3.0 * np.sin(2.0 * np.pi * (0.5 * time + 0.5 * time**2)),
+    ]
+    found = []
+    for drive in drives:
+        run = plant.simulate(drive, DT, plant.initial_state())
+        found.append({"drive": drive, **{c: np.asarray(getattr(run, c)) for c in NOISE}})
+    return found
+
+
+def records(runs: Sequence[Mapping[str, Array]], filtered: bool = False) -> list[Record]:
+    """With the noise of the sensors; ``filtered``: low-passed at 200 Hz, with hum, in steps of a 12-bit converter."""
+    draw, found = np.random.default_rng(11), []
+    for number, run in enumerate(runs):
+        channels = {"drive": run["drive"]}
+        for channel, std in NOISE.items():
+            noise = draw.standard_normal(run["drive"].size)
+            if filtered:
+                noise = lfilter(*butter(2, 2.0 * DT * 200.0), noise)
+                noise += np.sin(2.0 * np.pi * 50.0 * DT * np.arange(noise.size) + number)
+            seen = run[channel] + std * noise
+            channels[channel] = np.round(seen / (0.7 * std)) * (0.7 * std) if filtered else seen
+        found.append(Record.sampled(f"record_{number}", DT, channels))
+    return found
+
+
+def document(done: Diagnosis) -> dict[str, Any]:
+    """As a file holds it; its page can be made."""
+    found = plain(done.result)
+    assert found["verdict"]["text"] in render([found])
+    return found
+
+
+@pytest.mark.parametrize("filtered", [False, True], ids=["white", "real"])
+def test_nothing_missing_is_complete_whatever_the_sensors(model: Model, runs, filtered: bool) -> None:
+    found = document(diagnose(model, records(runs, filtered)))
+    assert found["verdict"]["kind"] == "complete", found["verdict"]["text"]
+    for part in ("fit", "validation"):
+        assert 0.95 < found["residual"]["after"][part] < 1.05
+    assert found["data_sheet"] == [] == found["recording"]["faults"]
+    assert all(r["beyond_noise"] < 0.25 * r["noise"] for r in found["remainder"])
+    if filtered:
+        assert all(50.0 in lines for lines in found["recording"]["mains_lines"].values())
+
+
+def test_a_wrong_supply_pressure_is_a_matter_of_the_data_sheet(model: Model) -> None:
+    nominal = model.value("supply_pressure")
+    truth = 0.97 * nominal
+    done = diagnose(model, records(driven(model.with_values({"supply_pressure": truth}))))
+    found = document(done)
+    assert found["verdict"]["kind"] == "data sheet", found["verdict"]["text"]
+    (number,) = found["data_sheet"]
+    assert (number["key"], number["nominal"]) == ("supply_pressure", nominal)
+    assert abs(number["value"] - truth) < max(3.0 * number["standard_error"], 1e-3 * truth)
+    assert done.model.value("supply_pressure") == pytest.approx(number["value"])
+    assert done.model.value("piston_area_a") == model.value("piston_area_a")  # what is not named is as it was
+    assert "supply_pressure is" in found["verdict"]["text"]
+
+
+def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> None:
+    late = [{c: np.concatenate((v[:1], v[:1], v[:-2])) if c.startswith("pressure") else v for c, v in run.items()}
+            for run in runs]  # fmt: skip
+    found = document(diagnose(model, records(late)))
+    assert found["verdict"]["kind"] == "recording", found["verdict"]["text"]
+    (fault,) = found["recording"]["faults"]
+    assert fault["name"] == "pressures" and fault["channels"] == ["pressure_a", "pressure_b"]
+    assert fault["size"] == pytest.approx(2.0 * DT, rel=0.1)
+    assert "late" in found["verdict"]["text"]
+    assert_cannot_inject(found)
+
+
+def test_spikes_are_counted_and_do_not_count(model: Model, runs) -> None:
+    spoiled = []
+    for record in records(runs):
+        wild = record["pressure_a"].copy()
+        wild[200::400] += 50.0 * NOISE["pressure_a"]
+        spoiled.append(Record.sampled(record.name, DT, {**record.channels, "pressure_a": wild}))
+    found = document(diagnose(model, spoiled))
+    assert found["verdict"]["kind"] == "recording", found["verdict"]["text"]
+    (spikes,) = found["recording"]["spikes"]
+    assert spikes["channel"] == "pressure_a" and 27 <= spikes["count"] <= 30
+    assert 0.95 < found["residual"]["after"]["validation"] < 1.05

@@ -1,0 +1,159 @@
+"""What else a fit may move beside parameters: initial states, nuisance, priors, and how a channel was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations, minimise
+from hydraulic_sysid.estimation.noise_model import ChannelNoise
+from hydraulic_sysid.estimation.parameters import Parameters
+from hydraulic_sysid.estimation.projection import Projection
+from hydraulic_sysid.estimation.recording import Timing
+from hydraulic_sysid.estimation.segments import cut
+
+Array = np.ndarray
+
+DT = 1e-3
+TIME = DT * np.arange(400)
+
+
+@pytest.mark.parametrize("delay", [2.0e-3, -3.0e-3, 0.3e-3, -0.4e-3, 1.5e-3, 7.7e-3])
+def test_a_delayed_sine_is_the_sine_of_an_earlier_time(delay: float) -> None:
+    wave = np.sin(2.0 * np.pi * 5.0 * TIME)[None]
+    found = Timing(delay=delay).applied(wave, DT)
+    inside = slice(10, -10)
+    assert np.allclose(found[0, inside], np.sin(2.0 * np.pi * 5.0 * (TIME - delay))[inside], atol=3e-6)
+
+
+@pytest.mark.parametrize("delay", [2.0e-3, -3.0e-3, 0.3e-3, 1.5e-3])
+def test_a_delayed_ramp_is_one_to_both_its_ends(delay: float) -> None:
+    assert np.allclose(Timing(delay=delay).applied(3.0 * TIME[None], DT), 3.0 * (TIME - delay)[None], atol=1e-12)
+
+
+def test_a_low_pass_delays_a_ramp_by_its_time_constant() -> None:
+    assert np.allclose(Timing(lag=4e-3).applied(3.0 * TIME[None], DT), 3.0 * (TIME - 4e-3)[None], atol=1e-12)
+
+
+def test_a_low_pass_of_a_sine_has_the_gain_and_phase_of_its_corner() -> None:
+    lag, omega = 4e-3, 2.0 * np.pi * 10.0
+    found = Timing(lag=lag).applied(np.sin(omega * TIME)[None], DT)[0]
+    response = 1.0 / (1.0 + 1j * omega * lag)
+    settled = slice(100, None)
+    assert np.allclose(found[settled], np.imag(response * np.exp(1j * omega * TIME))[settled], atol=1e-3)
+
+
+def test_a_low_pass_and_a_delay_follow_each_other() -> None:
+    both = Timing(delay=2e-3, lag=4e-3).applied(3.0 * TIME[None], DT)
+    assert np.allclose(both, 3.0 * (TIME - 6e-3)[None], atol=1e-12)
+
+
+def test_nuisance_is_projected_as_dense_algebra_says() -> None:
+    """Initial states are free, nuisance has unit variance: what is left costs rᵀ(I + NNᵀ + ∞·JJᵀ)⁻¹r."""
+    draw = np.random.default_rng(0)
+    raw = draw.standard_normal((2, 30))
+    jacobian, nuisance = draw.standard_normal((2, 30, 3)), draw.standard_normal((2, 30, 4))
+    found = Projection.of(raw, jacobian, nuisance)
+    columns = draw.standard_normal((2, 30, 2))
+    for s in range(2):
+        covariance = np.eye(30) + nuisance[s] @ nuisance[s].T
+        weight = np.linalg.inv(covariance)
+        j = jacobian[s]
+        weight -= weight @ j @ np.linalg.solve(j.T @ weight @ j, j.T @ weight)
+        assert found.residual[s] @ found.residual[s] == pytest.approx(raw[s] @ weight @ raw[s], rel=1e-6)
+        beyond = found.beyond(columns)[s]
+        assert np.allclose(beyond.T @ beyond, columns[s].T @ weight @ columns[s], rtol=1e-6)
+        assert np.allclose(beyond.T @ found.residual[s], columns[s].T @ weight @ raw[s], rtol=1e-6)
+        change = -np.linalg.solve(j.T @ np.linalg.solve(covariance, j), j.T @ np.linalg.solve(covariance, raw[s]))
+        assert np.allclose(found.correction[s] @ raw[s], change, rtol=1e-6)
+
+
+def test_without_nuisance_only_the_initial_states_are_taken() -> None:
+    draw = np.random.default_rng(1)
+    raw, jacobian = draw.standard_normal((1, 30)), draw.standard_normal((1, 30, 3))
+    found = Projection.of(raw, jacobian, np.zeros((1, 30, 0)))
+    best, *_ = np.linalg.lstsq(jacobian[0], raw[0], rcond=None)
+    assert np.allclose(found.residual[0], raw[0] - jacobian[0] @ best, atol=1e-5)
+
+
+class Line:
+    """A linear fit y = A·x with what is known of x beforehand."""
+
+    def __init__(self, a: Array, y: Array, parameters: Parameters) -> None:
+        self.a, self.y, self.parameters = a, y, parameters
+
+    @property
+    def left(self) -> Array:
+        return self.a @ self.parameters.values - self.y
+
+    @property
+    def cost(self) -> float:
+        return float(self.left @ self.left) + self.parameters.prior_cost
+
+    @property
+    def normal(self) -> NormalEquations:
+        columns = self.a * self.parameters.scales
+        information = columns.T @ columns + np.diag(self.parameters.prior_information)
+        return NormalEquations(information, ((columns * self.left[:, None]),), self.parameters.prior_gradient)
+
+    def moved(self, change: Array) -> Line:
+        return Line(self.a, self.y, self.parameters.moved(change))
+
+
+def test_a_fit_with_priors_ends_where_the_closed_form_says() -> None:
+    draw = np.random.default_rng(2)
+    a, y = draw.standard_normal((40, 3)), draw.standard_normal(40)
+    mean, std = np.array([1.0, -2.0, 0.0]), np.array([0.1, 0.5, np.inf])
+    begin = Parameters.unbounded(np.array([3.0, 3.0, 3.0]))
+    begin = replace(begin, mean=mean, std=std, scales=np.array([1.0, 10.0, 0.1]))
+    found = minimise(Line(a, y, begin), 50, 0.0, 1e-6).point.parameters
+    ridge = np.diag(std**-2.0)
+    exact = np.linalg.solve(a.T @ a + ridge, a.T @ y + ridge @ mean)
+    assert np.allclose(found.values, exact, atol=1e-6)
+    assert begin.prior_cost == pytest.approx((2.0 / 0.1) ** 2 + (5.0 / 0.5) ** 2)
+
+
+def simulated(values: Mapping[str, float], seconds: float = 4.0) -> Record:
+    """The sample bench with these values, white noise on its sensors, driven by random steps."""
+    plant = Plant(load_model("sample_bench").with_values(values))
+    draw = np.random.default_rng(7)
+    drive = np.repeat(draw.uniform(-4.0, 4.0, round(seconds / 0.25)), 250)
+    run = plant.simulate(drive, DT, plant.initial_state())
+    noise = {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}
+    seen = {c: np.asarray(getattr(run, c)) + n * draw.standard_normal(drive.size) for c, n in noise.items()}
+    return Record.sampled("simulated", DT, {"drive": drive, **seen})
+
+
+def test_a_prior_holds_a_parameter_as_firmly_as_it_says() -> None:
+    segments = cut([simulated({"moving_mass": 500.0})], "hydraulic", 0.5)
+    plant = Plant(load_model("sample_bench"))
+    free = fit_segments(plant, segments, ["moving_mass"], FitSettings()).point
+    known = fit_segments(plant, segments, ["moving_mass"], FitSettings(), priors={"moving_mass": (450.0, 1.0)}).point
+    (information,) = np.diag(free.normal.information) / free.parameters.scales**2
+    expected = (information * free.parameters.values[0] + 450.0) / (information + 1.0)
+    assert free.parameters.values[0] == pytest.approx(500.0, rel=0.02)
+    assert known.parameters.values[0] == pytest.approx(expected, rel=0.01)
+
+
+def test_the_beginning_of_a_record_is_not_judged() -> None:
+    (segments,) = cut([simulated({})], "hydraulic", 0.5)
+    assert segments.first[0] == 100
+    assert segments.counted.tolist() == [3 * segments.samples] * len(segments)
+
+
+def test_another_noise_judges_the_same_deviations() -> None:
+    (segments,) = cut([simulated({})], "hydraulic", 0.5)
+    judged = segments.with_noise([ChannelNoise.white(2.0 * n.std) for n in segments.noise])
+    run = segments.measured + 1.0
+    none = np.zeros((len(segments), len(segments.free)))
+    assert np.allclose(2.0 * judged.deviation(run, none), segments.deviation(run, none))
+    assert np.allclose(judged.in_units(judged.deviation(run, none)), -1.0)
+    measured = [k for k, free in enumerate(segments.unmeasured_pressures) if not free and segments.free[k] != 1]
+    assert np.allclose(judged.prior_std[measured], 2.0 * segments.prior_std[measured])
