@@ -9,7 +9,6 @@ from numba import njit
 P0 = 101325.0
 BLEND = 2e4  # Pa: below this drop the orifice turns laminar
 EDGE = 0.12  # rounding of overlapped and underlapped edges, of their width
-REST = 7.15e6  # Pa: mean chamber pressure at rest
 
 
 @njit(inline="always")
@@ -114,20 +113,27 @@ def past_piston(drop, x, p, thin):
     return q, slope
 
 
+@njit(inline="always")
+def oil_force(pa, pb, p):
+    """Force of both pressures on the piston, N; written so that equal areas take the difference alone."""
+    return (pa - pb) * p.area + pb * (p.area - p.area_b)
+
+
 @njit
 def friction_level(v, x, pa, pb, t, p):
     """Level of dry friction towards which the bristles bend, N (never negative)."""
     g = p.coulomb
     if p.coulomb_difference != 0.0:
-        g += p.coulomb_difference * math.tanh(v / 2e-4)
-    if p.coulomb_growth != 0.0:  # growth over 0.8 m: hyperbolic cosine, same curvature in the middle
-        g += p.coulomb_growth * 2.0 * 0.64 * (math.cosh(x / 0.8) - 1.0)
+        g += p.coulomb_difference * math.tanh(v / p.reversal_speed)
+    if p.coulomb_growth != 0.0:  # hyperbolic cosine, same curvature in the middle
+        far = p.growth_length
+        g += p.coulomb_growth * 2.0 * far * far * (math.cosh(x / far) - 1.0)
     if p.periodic_friction != 0.0:
         g *= 1.0 + p.periodic_friction * math.sin(2.0 * math.pi * x / p.periodic_length)
     if p.seal_friction != 0.0:
-        g += p.seal_friction * abs(pa - REST) + p.seal_friction * abs(pb - REST)
+        g += p.seal_friction * abs(pa - p.rest_pressure) + p.seal_friction * abs(pb - p.rest_pressure)
     if p.load_friction != 0.0:
-        g += p.load_friction * p.area * abs(pa - pb)
+        g += p.load_friction * abs(oil_force(pa, pb, p))
     if p.stribeck_rise != 0.0:
         ratio = v / p.stribeck_speed
         g += p.stribeck_rise * math.exp(-ratio * ratio)
@@ -139,9 +145,9 @@ def friction_level(v, x, pa, pb, t, p):
 @njit
 def outer_force(x, v, t, thin, p):
     """Forces on the piston besides pressures, bristles and other masses, N."""
-    f = p.load - (p.viscous + p.viscous_difference * math.tanh(v / 5e-3)) * thin * v
+    f = p.load - (p.viscous + p.viscous_difference * math.tanh(v / p.viscous_reversal_speed)) * thin * v
     if p.spring != 0.0:
-        f -= p.spring * x * (1.0 + 0.05 * x * x)
+        f -= p.spring * x * (1.0 + p.spring_curve * x * x)
     if p.square_drag != 0.0:
         f -= p.square_drag * v * abs(v)
     if p.cogging != 0.0:
@@ -172,7 +178,7 @@ def contact(lead, lead_rate, p):
         return 0.0
     side = 1.0 if lead > 0.0 else -1.0
     w = 2.0 * math.pi * p.gap_frequency
-    # k·d^1.15, equal to the linear contact at a tenth of a millimetre of depth
-    stiff = p.gap_mass * w * w * depth * (depth / 1e-4) ** 0.15
-    damp = 2.0 * p.gap_damping * w * p.gap_mass * min(depth / 1e-4, 1.0)
+    # k·d^1.15, equal to the linear contact at the contact depth
+    stiff = p.gap_mass * w * w * depth * (depth / p.contact_depth) ** 0.15
+    damp = 2.0 * p.gap_damping * w * p.gap_mass * min(depth / p.contact_depth, 1.0)
     return side * max(stiff + damp * side * lead_rate, 0.0)

@@ -1,8 +1,9 @@
 """What the independent plant can be told: one record of numbers, each with the value at which it does nothing.
 
 SI units throughout. The first block is the plain bench of the data sheet; the second block holds laws that stand for
-effects of the library under test; the third holds effects that the library does not know. Nothing here is imported
-from the project: the plant is a judge, so it must not share code, solver or laws with what it judges.
+effects of the library under test; the third holds effects that the library does not know; the fourth holds sensors
+and logger; the last holds the sizes at which laws bend. Nothing here is imported from the project: the plant is a
+judge, so it must not share code, solver or laws with what it judges.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import numpy as np
 PLAIN: dict[str, float] = {
     "mass": 500.0,
     "area": 8.0645e-3,
+    "area_b": 8.0645e-3,
     "stroke": 1.524,
     "dead_volume": 3.048e-4,
+    "dead_volume_b": 3.048e-4,
     "bulk_modulus": 1.5168e9,
     "supply": 14.0e6,
     "tank": 0.3e6,
@@ -25,6 +28,10 @@ PLAIN: dict[str, float] = {
     "coulomb": 450.0,  # not on the data sheet
     "bristle": 2.25e-5,  # sliding distance over which the bristles bend, m: 450 N over 2e7 N/m
     "bristle_time": 1e-4,  # their damping over their stiffness, s
+    "load": 0.0,
+    "spool_frequency": 0.0,  # 0: ideal
+    "spool_damping": 0.7,
+    "spool_motor": 12.0,  # the torque motor's pole over the spool's
     "stop_stiffness": 6.14e8,
     "stop_damping": 200.0,
 }
@@ -35,7 +42,6 @@ LIBRARY_LAWS: dict[str, float] = {
     "stribeck_speed": 0.01,
     "coulomb_difference": 0.0,
     "coulomb_growth": 0.0,
-    "load": 0.0,
     "spring": 0.0,
     "second_mass": 0.0,
     "second_frequency": 20.0,
@@ -60,8 +66,6 @@ LIBRARY_LAWS: dict[str, float] = {
     "gain_asymmetry": 0.0,
     "gain_progression": 0.0,
     "opening_limit": 0.0,  # 0: none
-    "spool_frequency": 0.0,  # 0: ideal
-    "spool_damping": 0.7,
     "spool_rate": 0.0,  # 0: unlimited
     "command_delay": 0.0,
     "droop": 0.0,
@@ -77,7 +81,6 @@ LIBRARY_LAWS: dict[str, float] = {
     "sensor_lag": 0.0,
     "sensor_delay": 0.0,
     "sensor_play": 0.0,
-    "sensor_step": 2.4e-5,
     "offset_a": 0.0,
     "offset_b": 0.0,
 }
@@ -125,7 +128,28 @@ UNKNOWN_LAWS: dict[str, float] = {
     "transducer_lag": 0.0,  # s
 }
 
-NULL: dict[str, float] = PLAIN | LIBRARY_LAWS | UNKNOWN_LAWS
+RECORDING: dict[str, float] = {
+    "position_noise": 20e-6,  # m, before the converter
+    "pressure_noise": 15e3,  # Pa
+    "sensor_step": 2.4e-5,
+    "pressures_late": 0.0,  # samples
+    "drive_late": 0.0,  # samples
+    "spike_share": 0.0,  # of the samples of one channel
+    "spike_channel": 1.0,  # 0: position, 1: pressure A
+    "spike_size": 100.0,  # over the noise
+}
+
+BENDS: dict[str, float] = {
+    "rest_pressure": 7.15e6,  # Pa: mean chamber pressure at rest
+    "return_flow": 2e-3,  # m^3/s, where the back pressure turns from laminar to rough
+    "growth_length": 0.8,  # m, of a friction that grows as a hyperbolic cosine
+    "spring_curve": 0.05,  # 1/m^2
+    "contact_depth": 1e-4,  # m, where a Hertzian contact is as stiff as a linear one
+    "reversal_speed": 2e-4,  # m/s, over which dry friction that differs by direction turns
+    "viscous_reversal_speed": 5e-3,
+}
+
+NULL: dict[str, float] = PLAIN | LIBRARY_LAWS | UNKNOWN_LAWS | RECORDING | BENDS
 DTYPE = np.dtype([(name, np.float64) for name in NULL])
 
 

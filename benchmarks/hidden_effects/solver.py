@@ -27,7 +27,7 @@ def acceleration(x, v, pa, pb, z, x2, v2, x3, v3, t, thin, p):
     stiff = p.coulomb / p.bristle
     rate = v - stiff * abs(v) * z / g
     damping = p.bristle_time * math.exp(-((v / 0.01) ** 2))  # fades with speed, else LuGre is not passive
-    force = (pa - pb) * p.area - stiff * (z + damping * rate) + laws.outer_force(x, v, t, thin, p)
+    force = laws.oil_force(pa, pb, p) - stiff * (z + damping * rate) + laws.outer_force(x, v, t, thin, p)
     a2 = 0.0
     a3 = 0.0
     if p.second_mass > 0.0:
@@ -122,9 +122,9 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
                 pace = p.slew if abs(command) > abs(slewed) else p.slew * (1.0 - p.slew_asymmetry)
                 slewed += h * pace * math.tanh(1500.0 * (command - slewed) / pace)
                 command = slewed
-            if p.spool_frequency > 0.0:  # torque motor (fast pole) before spool and feedback wire
+            if p.spool_frequency > 0.0:  # torque motor (fast pole, none in a direct-driven valve) before the spool
                 w = 2.0 * math.pi * p.spool_frequency
-                s3 += (command - s3) * (1.0 - math.exp(-h * 12.0 * w))
+                s3 += (command - s3) * (1.0 - math.exp(-h * p.spool_motor * w))
                 bent = w * w * (s3 - s - half * sr) - 2.0 * p.spool_damping * w * sr
                 sr_new = sr + h * bent / (1.0 + p.spool_damping * w * h + 0.25 * w * w * h * h)
                 s_mid = s + 0.25 * h * (sr + sr_new)
@@ -154,17 +154,17 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
             mid_a = pa + half * rate_a
             mid_b = pb + half * rate_b
             ca = max(p.dead_volume + p.area * (0.5 * p.stroke + x_mid), 1e-6) * laws.softness(mid_a, p, beta)
-            cb = max(p.dead_volume + p.area * (0.5 * p.stroke - x_mid), 1e-6) * laws.softness(mid_b, p, beta)
+            cb = max(p.dead_volume_b + p.area_b * (0.5 * p.stroke - x_mid), 1e-6) * laws.softness(mid_b, p, beta)
             if p.hose > 0.0:  # the wall stiffens a little as it is stretched
-                ca += p.hose * (1.0 - 0.04 * (mid_a - laws.REST) / laws.REST)
-                cb += p.hose * (1.0 - 0.04 * (mid_b - laws.REST) / laws.REST)
+                ca += p.hose * (1.0 - 0.04 * (mid_a - p.rest_pressure) / p.rest_pressure)
+                cb += p.hose * (1.0 - 0.04 * (mid_b - p.rest_pressure) / p.rest_pressure)
             root_pa, slope_pa = laws.orifice(supply - pa)
             root_at, slope_at = laws.orifice(pa - pt)
             root_pb, slope_pb = laws.orifice(supply - pb)
             root_bt, slope_bt = laws.orifice(pb - pt)
             leak, leak_slope = laws.past_piston(pa - pb, x_mid, p, 1.0 / thin)
             qa = gain * (forward * root_pa - backward * root_at) - leak - p.area * v
-            qb = gain * (backward * root_pb - forward * root_bt) + leak + p.area * v
+            qb = gain * (backward * root_pb - forward * root_bt) + leak + p.area_b * v
             out_slope = p.leakage_external / thin
             qa -= out_slope * (pa - P_DRAIN)
             qb -= out_slope * (pb - P_DRAIN)
@@ -211,7 +211,7 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
                 stiff = (p.supply / max(ps, 1e6)) ** 1.8333
                 ps += h * (p.supply - p.droop * drawn - ps) / (p.droop_time * stiff)
             if p.back_pressure > 0.0:  # return line between laminar and fully rough (exponent 1.85)
-                rise = p.back_pressure * returned * returned * (abs(returned) / 2e-3 + 1e-3) ** -0.15
+                rise = p.back_pressure * returned * returned * (abs(returned) / p.return_flow + 1e-3) ** -0.15
                 pt += (p.tank + math.copysign(rise, returned) - pt) * (1.0 - math.exp(-h / p.back_pressure_time))
             if p.limit_cycle != 0.0:  # van der Pol's relaxation oscillation
                 w = 2.0 * math.pi * p.limit_cycle_frequency * 1.8
@@ -225,7 +225,7 @@ def simulate(p, feed, centring, noise_x, noise_a, noise_b, start, out, truth):
                 f2 += (f1 - f2) * (1.0 - math.exp(-h / (0.08 * p.sensor_lag)))
             if p.foundation > 0.0:
                 w = 2.0 * math.pi * p.foundation_frequency
-                push = p.foundation * (pa - pb) * p.area
+                push = p.foundation * laws.oil_force(pa, pb, p)
                 floor_v += h * (w * w * (push - floor_x) - 0.1 * w * floor_v)
                 floor_x += h * floor_v
             if p.transducer_lag > 0.0:

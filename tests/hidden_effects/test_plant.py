@@ -78,6 +78,32 @@ def test_steady_speed_follows_the_orifice_equation(drive):
     assert load == pytest.approx(friction, rel=1e-2)
 
 
+UNEQUAL = {"area": 5e-3, "area_b": 3e-3, "dead_volume": 3e-4, "dead_volume_b": 5e-4}
+
+
+def test_unequal_areas_swing_at_the_resonance_of_both_chambers():
+    volumes = [UNEQUAL["dead_volume" + s] + UNEQUAL["area" + s] * P["stroke"] / 2 for s in ("", "_b")]
+    stiffness = P["bulk_modulus"] * (UNEQUAL["area"] ** 2 / volumes[0] + UNEQUAL["area_b"] ** 2 / volumes[1])
+    balance = UNEQUAL["area_b"] / UNEQUAL["area"] * MIDDLE
+    _, seen = plant.run(FREE | UNEQUAL, still(2.0), centring=0.0, start=(0.0, 1e-3, balance, MIDDLE))
+    x = seen["position"]
+    i = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
+    period = np.diff(i + x[i] / (x[i] - x[i + 1])).mean() / experiments.RATE
+    assert period == pytest.approx(2 * math.pi * math.sqrt(P["mass"] / stiffness), rel=5e-4)
+
+
+@pytest.mark.parametrize("drive", [-5.0, 5.0])
+def test_unequal_areas_move_at_unequal_speeds(drive):
+    load = 2000.0
+    _, seen = plant.run(UNEQUAL | {"leakage": 0.0, "load": load}, np.full(600, drive), centring=0.0)
+    speed = seen["velocity"][-100:].mean()
+    push = math.copysign(1.0, drive) * load - P["coulomb"] - P["viscous"] * abs(speed)
+    a, b = UNEQUAL["area"], UNEQUAL["area_b"]
+    first, second = (a, b) if drive > 0.0 else (b, a)
+    square = (P["supply"] * first - P["tank"] * second + push) / (a**3 + b**3) / P["valve_drop"]
+    assert abs(speed) == pytest.approx(P["valve_flow"] * abs(drive) / P["drive_limit"] * math.sqrt(square), rel=2e-3)
+
+
 def test_end_stops_hold():
     _, seen = plant.run({}, np.full(6000, 8.0), centring=0.0)
     pressed = (seen["pressure_a"][-1] - seen["pressure_b"][-1]) * P["area"] / P["stop_stiffness"]
