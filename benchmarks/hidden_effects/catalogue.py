@@ -1,4 +1,5 @@
-"""What can be hidden in a bench: the laws that stand for library effects, and those that the library does not know.
+"""What can be hidden in a bench: laws that stand for library effects, laws that the library does not know, faults of
+the recording, and wrong numbers of the data sheet.
 
 Each entry gives a mild value (clearly above the noise, no more) and a strong one; the seed of a bench scatters them by
 ±15 % and draws signs where both make sense. Effects that are known to be there in every bench (viscous and Coulomb
@@ -14,17 +15,20 @@ from dataclasses import dataclass, field
 class Hidden:
     """One hidden effect. ``values``: plant parameter → (mild, strong); ``truth``: plant parameter → parameter of the
     library's effect that has the same meaning (compared with what a diagnosis finds); ``signed``: plant parameters
-    of either sign; ``sheet``: data-sheet values that differ from the plain bench (known to the user); ``companions``:
-    names that are also right beside the effect's own; ``subsystems``: the first is the true one, the others are as
-    good (oil that is soft shows in the flow balances)."""
+    of either sign; ``relative``: those whose sizes are shares of their plain value; ``sheet``: data-sheet values that
+    differ from the plain bench (known to the user); ``companions``: names that are also right beside the effect's own;
+    ``subsystems``: the first is the true one, the others are as good (oil that is soft shows in the flow balances);
+    ``said``: what a diagnosis may call a fault of the recording or a wrong number, the first is the true one."""
 
     name: str
     subsystems: tuple[str, ...]
     values: dict[str, tuple[float, float]]
     truth: dict[str, str] = field(default_factory=dict)
     signed: tuple[str, ...] = ()
+    relative: tuple[str, ...] = ()
     sheet: dict[str, float] = field(default_factory=dict)
     companions: tuple[str, ...] = ()
+    said: tuple[str, ...] = ()
     what: str = ""
 
 
@@ -80,7 +84,8 @@ _LIBRARY = (
            {"ripple": "amplitude", "ripple_frequency": "frequency"}),
     Hidden("sensor_offset", SENSOR, {"sensor_offset": (0.06, 0.15)}, {"sensor_offset": "offset"},
            signed=("sensor_offset",)),
-    Hidden("sensor_scale", SENSOR, {"sensor_scale": (0.03, 0.08)}, {"sensor_scale": "scale"}, signed=("sensor_scale",)),
+    Hidden("sensor_scale", SENSOR, {"sensor_scale": (0.03, 0.08)}, {"sensor_scale": "scale"}, signed=("sensor_scale",),
+           relative=("sensor_scale",)),
     Hidden("sensor_nonlinearity", SENSOR, {"sensor_cubic": (0.08, 0.3)}, {"sensor_cubic": "cubic"},
            signed=("sensor_cubic",)),
     Hidden("sensor_lag", SENSOR, {"sensor_lag": (2.2e-3, 9e-3)}, {"sensor_lag": "time"}),
@@ -131,12 +136,36 @@ _UNKNOWN = (
            what="the floor that carries the sensor resonates"),
     Hidden("transducer_gain", SENSOR, {"transducer_gain": (0.015, 0.05)}, signed=("transducer_gain",),
            what="gain error of one pressure transducer"),
-    Hidden("transducer_lag", SENSOR, {"transducer_lag": (2e-3, 1e-2)}, what="slow pressure transducers"),
+)  # fmt: skip
+
+_RECORDING = (
+    Hidden("transducer_lag", SENSOR, {"transducer_lag": (2e-3, 1e-2)}, said=("pressures_low_pass",),
+           what="slow pressure transducers"),
+    Hidden("pressures_late", SENSOR, {"pressures_late": (1.5, 2.6)}, said=("pressures",),
+           what="pressures that the logger has late"),
+    Hidden("drive_late", SENSOR, {"drive_late": (1.2, 1.9)}, said=("drive", "position"),
+           what="a drive that the logger has late"),
+    Hidden("spikes", SENSOR, {"spike_share": (2e-3, 5e-3)}, said=("spikes",), what="a loose contact"),
+)  # fmt: skip
+
+_DATUM = (
+    Hidden("supply_pressure", SUPPLY, {"supply": (0.026, 0.043)}, {"supply": "supply_pressure"}, signed=("supply",),
+           relative=("supply",), said=("supply_pressure",)),
+    # With forces and flows free to scale, the records hold the ratio of the areas alone.
+    Hidden("piston_area_b", FORCE, {"area_b": (0.024, 0.035)}, {"area_b": "piston_area_b"}, signed=("area_b",),
+           relative=("area_b",), said=("piston_area_b", "piston_area_a")),
+    Hidden("moving_mass", FORCE, {"mass": (0.5, 0.9)}, {"mass": "moving_mass"}, relative=("mass",),
+           said=("moving_mass",), what="a payload that the data sheet does not know"),
+    Hidden("dead_volume_a", FLUID, {"dead_volume": (0.4, 0.5)}, {"dead_volume": "dead_volume_a"},
+           signed=("dead_volume",), relative=("dead_volume",), said=("dead_volume_a",)),
 )  # fmt: skip
 
 LIBRARY = {h.name: h for h in _LIBRARY}
 UNKNOWN = {h.name: h for h in _UNKNOWN}
-EVERY = LIBRARY | UNKNOWN
+RECORDING = {h.name: h for h in _RECORDING}
+DATUM = {h.name: h for h in _DATUM}
+EVERY = LIBRARY | UNKNOWN | RECORDING | DATUM
+KINDS = {"single": LIBRARY, "unknown": UNKNOWN, "recording": RECORDING, "datum": DATUM}
 
 PAIRS: tuple[tuple[str, str], ...] = (
     ("entrained_air", "command_delay"),

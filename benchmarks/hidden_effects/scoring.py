@@ -9,6 +9,8 @@ import math
 from typing import Any
 
 MISSING, TIE, COMPLETE, OUTSIDE = "missing", "indistinguishable", "complete", "outside the library"
+DATA_SHEET, RECORDING = "data sheet", "recording"
+DATUM = "datum"  # kind of a bench with a wrong data sheet
 NEAR = 0.10  # of the true value, from the parameter's null
 AS_GOOD = 1.2  # held-out error over that of the true structure
 NULLS = {"sensor_scale.scale": 1.0}
@@ -32,6 +34,20 @@ def shortlist(result: dict[str, Any]) -> list[str]:
     return [e["name"] for e in _ranked(result)[:3]]
 
 
+def _said(result: dict[str, Any]) -> list[str]:
+    """Numbers of the data sheet and faults of the recording that the diagnosis names."""
+    recording = result.get("recording", {})
+    faults = [f["name"] for f in recording.get("faults", ())]
+    return [d["key"] for d in result.get("data_sheet", ())] + faults + ["spikes"] * bool(recording.get("spikes"))
+
+
+def accepted(answer: dict[str, Any]) -> tuple[str, ...]:
+    """Verdicts that are right where nothing is hidden: a sheet may be found off, and spikes are a fault."""
+    if not answer["setting"]["sized"]:
+        return (COMPLETE,)
+    return (COMPLETE, DATA_SHEET, RECORDING) if answer["setting"]["sensors"] == "spiky" else (COMPLETE, DATA_SHEET)
+
+
 def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
     """One bench's marks: which of the figures count for its kind, and whether each is met (see `RATES`)."""
     kind = result["verdict"]["kind"]
@@ -44,13 +60,20 @@ def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
         "true": true,
         "verdict": kind,
         "named": names,
+        "said": _said(result),
         "shortlist": shortlist(result),
     }
+    blind = "pressure_a_Pa" not in answer["columns"]
     if answer["kind"] == "none":
-        marks["silent"] = kind == COMPLETE
+        marks["silent"] = kind in accepted(answer)
+        marks["named_none"] = kind in (MISSING, TIE)
+    elif answer["kind"] in (DATUM, RECORDING):
+        silent = kind in (COMPLETE, DATA_SHEET, RECORDING)
+        marks["fault_named"] = silent and any(name in marks["said"] for name in answer["said"][0])
     elif answer["kind"] == "single":
-        marks["right_first"] = kind == MISSING and names[:1] == true
-        marks["first_three"] = true[0] in marks["shortlist"]
+        tied = kind == TIE and blind and true[0] in result["verdict"].get("effects", ())  # these channels hold no more
+        marks["right_first"] = (kind == MISSING and names[:1] == true) or tied
+        marks["first_three"] = true[0] in marks["shortlist"] or tied
         marks["nothing_beside"] = set(names) <= {*true, *answer["companions"]}
     elif answer["kind"] == "pair":
         marks["both_found"] = kind in (MISSING, TIE) and set(true) <= set(names)
@@ -106,12 +129,18 @@ def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
     return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
+# kind of bench → the mark that says whether its diagnosis was right
+RIGHT = {"none": "silent", "single": "right_first", "pair": "both_found", "unknown": "said_so",
+         "datum": "fault_named", "recording": "fault_named"}  # fmt: skip
+
 # figure → (title, what is wanted, mark it counts, whether it is the parameters' mark)
 RATES = {
-    "right_first": ("one hidden effect: right name first", "≥ 90 %"),
+    "right_first": ("one hidden effect: right name first", "≥ 92 %"),
     "first_three": ("one hidden effect: among the first three", "≥ 98 %"),
     "nothing_beside": ("one hidden effect: nothing else named beside it", ""),
     "false_alarms": ("nothing missing: false alarms", "≤ 5 %"),
+    "named_none": ("nothing missing: an effect named", "≤ 3 %"),
+    "fault_named": ("wrong datum or recording: named, and no effect", "≥ 90 %"),
     "both_found": ("two hidden effects: both found", "≥ 80 %"),
     "one_found": ("two hidden effects: at least one found", ""),
     "said_so": ("unknown to the library: said so", "≥ 80 %"),

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from hidden_effects import benches, matrix, scoring
+from hidden_effects import benches, matrix, plant, scoring
 
 DEADBAND = {
     "name": "b", "kind": "single", "severity": "mild", "hidden": {"valve_deadband": {"width": 0.02}},
-    "companions": [], "subsystems_as_good": [["valve"]],
+    "companions": [], "subsystems_as_good": [["valve"]], "columns": list(plant.COLUMNS), "setting": {"sized": False},
 }  # fmt: skip
 
 
@@ -95,7 +95,8 @@ def test_selection_and_page(tmp_path):
     bench = benches.Bench("single", ("valve_deadband",), "mild", 1)
     width = bench.truth()["valve_deadband"]["width"]
     marks = scoring.judge(bench.answer(), said("missing", effect("valve_deadband", width=(width, 1e-4))))
-    page = matrix.document([{"marks": marks, "cpu_seconds": 12.0, "peak_MiB": 300.0}], "the command", 160)
-    assert "    the command" in page and "| valve_deadband | 1 | valve_deadband |" in page
-    assert "| one hidden effect: right name first | ≥ 90 % | 1/1 = 100 % | 21…100 % |" in page
+    outcome = {"answer": bench.answer(), "marks": marks, "cpu_seconds": 12.0, "peak_MiB": 300.0}
+    page = matrix.document([outcome])
+    assert "benchmarks/diagnosis_matrix.py --doc" in page and "| valve_deadband | 1 | valve_deadband |" in page
+    assert "| one hidden effect: right name first | ≥ 92 % | 1/1 = 100 % | 21…100 % |" in page
     assert matrix.gather([bench], tmp_path) == []

@@ -1,0 +1,41 @@
+"""A family of benches: any geometry, sensors, loop and data sheet, with nothing, one effect, a wrong number or a fault
+of the recording hidden. Every member follows from the draw's seed and its own number, whatever else is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from . import catalogue, motion, settings
+from . import sensors as instruments
+from .benches import SEVERITIES, Bench
+from .geometry import GEOMETRIES, Geometry
+
+WHAT = {"none": 0.3, "effect": 0.4, "datum": 0.15, "recording": 0.15}  # what is hidden, and how often
+KINDS = {"none": "none", "effect": "single", "datum": "datum", "recording": "recording"}
+APART = 100_000  # between the benches' seeds of two draws
+
+
+def draw(count: int, seeds: Iterable[int], what: str | None = None) -> list[Bench]:
+    """``count`` benches of each of these seeds; ``what``: of `WHAT`, that all of them hide."""
+    return [member(seed, number, what) for seed in seeds for number in range(count)]
+
+
+def member(seed: int, number: int, what: str | None = None) -> Bench:
+    """One bench of the draw ``seed``."""
+    rng = np.random.default_rng((seed, number, *([] if what is None else [1 + list(WHAT).index(what)])))
+    geometry = GEOMETRIES[str(rng.choice(list(GEOMETRIES)))]
+    sensors = str(rng.choice(list(instruments.KINDS)))
+    setting = settings.Setting(geometry.name, sensors, str(rng.choice(motion.LOOPS)), str(rng.choice(settings.SHEETS)))
+    what = what or str(rng.choice(list(WHAT), p=list(WHAT.values())))
+    kind, seed = KINDS[what], seed * APART + number
+    if kind == "none":
+        return Bench(kind, seed=seed, setting=setting)
+    name = str(rng.choice(possible(geometry, kind)))
+    return Bench(kind, (name,), str(rng.choice(SEVERITIES)), seed, setting)
+
+
+def possible(geometry: Geometry, kind: str) -> list[str]:
+    """What of a kind can be hidden in a geometry, since the records of that would show it."""
+    return [name for name in catalogue.KINDS[kind] if name not in geometry.never]
