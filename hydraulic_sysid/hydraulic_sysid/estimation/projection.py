@@ -6,7 +6,7 @@ of a fit: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413–432; Kaufman, BI
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +32,7 @@ class Projection:
     basis: Array
     taken: Array
     correction: Array
+    log_determinant: Array
 
     @classmethod
     def of(cls, raw: Array, jacobian: Array, nuisance: Array) -> Projection:
@@ -49,7 +50,8 @@ class Projection:
         size = np.clip(size, 1e-15, 1.0)
         basis = (whole @ turn) / np.sqrt(size)[:, None, :]
         correction = -np.linalg.solve(np.swapaxes(root, -1, -2), np.swapaxes(whole, -1, -2))[:, :free]
-        return cls(raw, basis, 1.0 - np.sqrt(1.0 - size), correction)
+        log_determinant = 2.0 * np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
+        return cls(raw, basis, 1.0 - np.sqrt(1.0 - size), correction, log_determinant)
 
     @cached_property
     def residual(self) -> Array:
@@ -62,8 +64,11 @@ class Projection:
 
     def with_raw(self, raw: Array) -> Projection:
         """Other residuals (S, m), the same directions."""
-        return Projection(raw, self.basis, self.taken, self.correction)
+        return replace(self, raw=raw)
 
     def subset(self, chosen: Mask) -> Projection:
         """Of the ``chosen`` (S,) segments alone."""
-        return Projection(self.raw[chosen], self.basis[chosen], self.taken[chosen], self.correction[chosen])
+        return Projection(
+            self.raw[chosen], self.basis[chosen], self.taken[chosen], self.correction[chosen],
+            self.log_determinant[chosen],
+        )  # fmt: skip

@@ -159,4 +159,3 @@ def _delays(point: FitPoint, columns: Sequence[Array], channels: Sequence[str]) 
     cover = inverse(information / np.outer(scale, scale)) / np.outer(scale, scale)
     step = np.clip(off - (cover @ gradient)[late], -LATE, LATE)
     return {c: (named[c] + float(step[k])) * dt[c] for k, c in enumerate(channels)}
-

@@ -53,7 +53,7 @@ def diagnose(
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
     say = progress or (lambda _: None)
-    found = Search.of(model, records, validation, settings or FitSettings(), say).run()
+    found = verdicts.conclusive(Search.of(model, records, validation, settings or FitSettings(), say).run())
     verdict = verdicts.judge(found)
     outside = verdict.kind == verdicts.OUTSIDE
     # Where most is left, what was added is a proxy for something else, and bends curves and balances.

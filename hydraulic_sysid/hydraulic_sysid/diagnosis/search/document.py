@@ -19,6 +19,7 @@ from .remainder import remainders, spikes
 from .search import SearchResult
 from .uncertainty import Known
 from .verdict import MISSING, OUTSIDE, UNSEEN, Verdict
+from .whiteness import whiteness
 from .worst_segments import worst_segments
 
 _NEAREST = 3
@@ -107,7 +108,7 @@ def document(
                     "name": f.hypothesis.name,
                     "channels": list(f.hypothesis.channels),
                     "size": f.size,
-                    "unit": "s",
+                    "unit": f.unit,
                     "standard_error": f.standard_error,
                     "text": f.text,
                     "remedy": f.hypothesis.remedy,
@@ -128,6 +129,7 @@ def document(
                 for c in result.split.channels
             },
         },
+        "whiteness": [vars(w) | {"coloured": w.coloured} for w in whiteness(result, final)],
         "remainder": [
             {"channel": r.channel, "beyond_noise": r.beyond, "noise": r.noise, "motion": r.motion, "share": r.share}
             for r in remainders(result, final)

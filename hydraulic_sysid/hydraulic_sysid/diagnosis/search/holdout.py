@@ -1,13 +1,15 @@
 """Records cut into segments, and which of them are for fitting, which for validation.
 
 Where no validation records are named, every third block of a few segments of every record is for validation, so that
-both have seen the same experiments; segments for validation never enter a fit, but they steer what is added.
+both have seen the same experiments; segments for validation never enter a fit, but they steer what is added. Of very
+long records blocks are left out, evenly, so that memory and time are bounded.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from hydraulic_sysid.estimation.segments import Segments, cut
 
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
+MOST_VALUES = 750_000  # measured values of all segments: two minutes of three channels at 2 kHz
 
 
 @dataclass(frozen=True)
@@ -56,11 +59,17 @@ def split(records: Sequence[Record], validation: Sequence[Record], kind: str, le
 
     :raises hydraulic_sysid.estimation.errors.SegmentError: a record cannot be cut.
     """
-    segments = cut(records, kind, length) + cut(validation, kind, length)
+    segments = _thinned(cut(records, kind, length) + cut(validation, kind, length))
     if validation:
         return Split(segments, [np.full(len(s), i < len(records)) for i, s in enumerate(segments)])
     # Shifted from record to record, so that not always the same phase of an experiment is for validation.
     return Split(segments, [_alternate(np.arange(len(s)), i) for i, s in enumerate(segments)])
+
+
+def _thinned(segments: list[Segments]) -> list[Segments]:
+    """One block in so many of each, where there are more than `MOST_VALUES`."""
+    every = ceil(sum(s.measured.size for s in segments) / MOST_VALUES)
+    return [s.subset(np.arange(len(s)) // BLOCK % every == 0) for s in segments] if every > 1 else segments
 
 
 def _alternate(number: Index, shift: int) -> Mask:

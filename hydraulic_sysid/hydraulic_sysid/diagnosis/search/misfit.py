@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array
+from hydraulic_sim.arrays import Array, Index, Mask
 
 from .holdout import Split
 
@@ -30,7 +30,11 @@ class Misfit:
     typical: float = math.inf
     """Mean square over noise without the worst segments: no single one turns a verdict."""
     by_segment: Array = field(default_factory=lambda: np.zeros(0), compare=False)
-    """Sum of squares of every segment."""
+    """Sum of squares of every segment, …"""
+    counted: Array = field(default_factory=lambda: np.zeros(0), compare=False)
+    """… how many values it is of, …"""
+    fitted: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool), compare=False)
+    """… and whether it was fitted."""
 
     @property
     def rms_fit(self) -> float:
@@ -72,29 +76,53 @@ def misfit(split: Split, costs: Sequence[Array]) -> Misfit:
     """Of the sums of squares ``costs[i]`` (S_i,); each initial state takes its degrees of freedom."""
     sums, counts = [0.0, 0.0], [0, 0]
     cost, count = np.concatenate(list(costs)), np.concatenate([s.counted for s in split.segments])
-    kept = np.argsort(cost / count)[: max(1, cost.size - max(1, round(WORST * cost.size)))]
+    kept = _but_the_worst(cost, count)
     for segments, fit, own in zip(split.segments, split.fit, costs, strict=True):
         for i, part in enumerate((fit, ~fit)):
             sums[i] += float(own[part].sum())
             counts[i] += int(segments.counted[part].sum())
-    return Misfit(sums[0], sums[1], counts[0], counts[1], float(cost[kept].sum() / count[kept].sum()), cost)
+    return Misfit(
+        sums[0],
+        sums[1],
+        counts[0],
+        counts[1],
+        float(cost[kept].sum() / count[kept].sum()),
+        cost,
+        count,
+        np.concatenate(split.fit),
+    )
 
 
 def material(before: Misfit, after: Misfit) -> bool:
     """Whether a reduction is more than chance, more than fitting itself gives, and enough to be seen.
 
-    It must be so without the few segments that gain most, too.
+    It must be so without the few segments that gain most, too; those that are worst in the end do not count.
     """
-    if before.total - after.total < before.least:
+    gain, fit, validation = before.total - after.total, before.fit - after.fit, before.validation - after.validation
+    if gain <= 0.0:
         return False
-    if before.by_segment.size and before.by_segment.size == after.by_segment.size:
-        gains = np.sort(before.by_segment - after.by_segment)
-        if gains[: gains.size - max(1, round(BEST * gains.size))].sum() < before.least:
-            return False
-    held = not before.n_validation or before.validation - after.validation > CONFIRMED * before.variance
-    return held and before.fit - after.fit > SIGNIFICANT * before.variance
+    if _comparable(before, after):
+        kept = _but_the_worst(after.by_segment, after.counted)
+        gains, fitted = (before.by_segment - after.by_segment)[kept], after.fitted[kept]
+        fit, validation = float(gains[fitted].sum()), float(gains[~fitted].sum())
+        gain = float(np.sort(gains)[: gains.size - max(1, round(BEST * gains.size))].sum())
+    held = not before.n_validation or validation > CONFIRMED * before.variance
+    return gain >= before.least and held and fit > SIGNIFICANT * before.variance
 
 
 def explained(before: Misfit, after: Misfit) -> float:
-    """Share of what noise does not explain that has gone."""
-    return (before.total - after.total) / max(before.excess, 1e-9 * before.total, before.total - after.total)
+    """Share of what noise does not explain that has gone, but for the segments that are worst in the end."""
+    gain, excess = before.total - after.total, before.excess
+    if _comparable(before, after):
+        kept = _but_the_worst(after.by_segment, after.counted)
+        gain = float((before.by_segment - after.by_segment)[kept].sum())
+        excess = float((before.by_segment - before.counted)[kept].sum())
+    return gain / max(excess, 1e-9 * before.total, gain)
+
+
+def _comparable(before: Misfit, after: Misfit) -> bool:
+    return 0 < before.by_segment.size == after.by_segment.size
+
+
+def _but_the_worst(cost: Array, count: Array) -> Index:
+    return np.argsort(cost / count)[: max(1, cost.size - max(1, round(WORST * cost.size)))]

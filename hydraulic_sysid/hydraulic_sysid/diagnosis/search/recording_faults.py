@@ -17,6 +17,7 @@ from hydraulic_sysid.estimation.levenberg_marquardt import bounded_step
 from hydraulic_sysid.estimation.recording import Timing
 from hydraulic_sysid.estimation.segments import Segments
 
+from .drive_faults import DRIVE_HYPOTHESES, DriveHypothesis
 from .linearisation import Linearisation
 
 ENOUGH = 50  # segments that do for a look
@@ -35,6 +36,7 @@ class Hypothesis:
     ways: tuple[int, ...]
     text: str
     remedy: str
+    unit: str = "s"
 
     def applied(self, segments: Segments, size: float) -> Segments:
         """Segments whose record is taken to have a fault of this ``size`` [s]."""
@@ -65,34 +67,41 @@ HYPOTHESES = (
     Hypothesis("position", ("position",), False, (-1,), "the position was recorded {size} early",
                "shift it, or sample all channels at one instant"),
 )  # fmt: skip
-UNSEEN_DRIVE = Hypothesis("drive_between_samples", ("drive",), False, (),
-                          "the drive changed between the samples of the record",
-                          "record as often as the drive is put out")  # fmt: skip
-JUMPS = 4  # of the drive in a segment, the largest, whose instant is uncertain by a sample
 
 
 @dataclass(frozen=True)
 class RecordingFault:
-    """A fault, its ``size`` [s] ± ``standard_error``, and the ``reduction`` of the sum of squares that it promises."""
+    """A fault, its ``size`` ± ``standard_error`` [``unit``], and by how much it lowers the sum of squares."""
 
-    hypothesis: Hypothesis
+    hypothesis: Hypothesis | DriveHypothesis
     size: float
     standard_error: float
     reduction: float
 
     def applied(self, at: Linearisation) -> list[Segments]:
         """The linearisation's segments, their records taken to have it."""
-        segments = at.point.shooting.segments
-        if self.hypothesis is UNSEEN_DRIVE:
-            return uncertain(at)
+        if isinstance(self.hypothesis, DriveHypothesis):
+            return self.hypothesis.applied(at)
+        return self.on(at.point.shooting.segments)
+
+    def on(self, segments: Sequence[Segments]) -> list[Segments]:
+        """Segments, their channels taken to have it; those of a fault of the drive are as they are."""
+        if isinstance(self.hypothesis, DriveHypothesis):
+            return list(segments)
         return [self.hypothesis.applied(s, self.size) for s in segments]
+
+    @property
+    def unit(self) -> str:
+        """Of the size."""
+        return self.hypothesis.unit
 
     @property
     def text(self) -> str:
         """In words, with its size."""
         late = "late" if self.size > 0.0 else "early"
-        corner = f"{1.0 / (2.0 * np.pi * abs(self.size)):.3g} Hz" if self.size else ""
-        return self.hypothesis.text.format(size=f"{1e3 * abs(self.size):.3g} ms", late=late, corner=corner)
+        corner = f"{1.0 / (2.0 * np.pi * abs(self.size)):.3g} Hz" if self.unit == "s" and self.size else ""
+        size = f"{1e3 * abs(self.size):.3g} m{self.unit}"
+        return self.hypothesis.text.format(size=size, late=late, corner=corner)
 
 
 def recording_faults(at: Linearisation) -> list[RecordingFault]:
@@ -108,15 +117,17 @@ def recording_faults(at: Linearisation) -> list[RecordingFault]:
         fault = _best(part, runs, hypothesis, before, share)
         found += [fault] if fault is not None else []
     if not any(s.disturbance.shape[-1] for s in point.shooting.segments):
-        lower = before - _cost_between(part)
-        dt = part.split.segments[0].record.dt
-        found += [RecordingFault(UNSEEN_DRIVE, dt, 0.0, lower / share)] if lower > 0.0 else []
+        for one in DRIVE_HYPOTHESES:
+            lower, half = (before - _cost_disturbed(part, one, size) for size in (1.0, 0.5))
+            # Disturbances of that size would show more than there is where half of them explains it better.
+            size = float(np.median([one.size(s) for s in at.split.segments]))
+            found += [RecordingFault(one, size, 0.0, lower / share)] if lower > max(half, 0.0) else []
     return sorted(found, key=lambda f: -f.reduction)
 
 
 def resized(at: Linearisation, fault: RecordingFault) -> RecordingFault:
     """The same fault with the size that fits best now; the linearisation's segments have it already."""
-    if fault.hypothesis is UNSEEN_DRIVE:
+    if isinstance(fault.hypothesis, DriveHypothesis):
         return fault
     part, share = at.sample(ENOUGH)
     segments = [fault.hypothesis.applied(s, -fault.size) for s in part.point.shooting.segments]
@@ -126,34 +137,17 @@ def resized(at: Linearisation, fault: RecordingFault) -> RecordingFault:
     return _best(part, runs, fault.hypothesis, np.inf, share, fault.size) or fault
 
 
-def uncertain(at: Linearisation) -> list[Segments]:
-    """Segments whose drive may have jumped anywhere between two samples, at its largest jumps in each."""
-    point, plant = at.point, at.point.plant
-    found = []
-    for i, (segments, states) in enumerate(zip(point.shooting.segments, point.initial_states, strict=True)):
-        drive = segments.record["drive"]
-        jump = np.append(np.diff(drive), 0.0)
-        inside = jump[segments.first[:, None] + np.arange(segments.samples - 1)]
-        largest = np.argsort(-np.abs(inside), axis=1)[:, :JUMPS] + segments.first[:, None]
-        base = segments.recorded(point.shooting.driven(plant, i, states, drive))
-        columns = []
-        for place in largest.T:
-            moved = drive.copy()
-            moved[place] += 0.5 * jump[place]
-            columns.append(segments.recorded(point.shooting.driven(plant, i, states, moved)) - base)
-        disturbance = np.stack(columns, axis=-1)
-        nuisance = np.concatenate((segments.nuisance, segments.whitened(disturbance)), axis=-1)
-        found.append(replace(segments, disturbance=disturbance, nuisance=nuisance))
-    return found
-
-
-def _cost_between(part: Linearisation) -> float:
-    """As `_cost`, for segments whose drive is `uncertain`."""
-    shooting = replace(part.point.shooting, segments=uncertain(part))
+def _cost_disturbed(part: Linearisation, hypothesis: DriveHypothesis, size: float) -> float:
+    """As `_cost`, for disturbances of this ``size`` over theirs, with what their freedom is worth."""
+    shooting = replace(part.point.shooting, segments=hypothesis.applied(part, size))
     projections = shooting.projections(part.point.plant, part.point.initial_states)
     point = replace(part.point, shooting=shooting, projections=projections)
     beyond = [p.beyond(b) for p, b in zip(projections, part.beyond, strict=True)]
-    return _cost(replace(part, point=point, beyond=beyond), [p.raw for p in projections])
+    worth = sum(
+        float(np.sum(new.log_determinant - old.log_determinant))
+        for new, old in zip(projections, part.point.projections, strict=True)
+    )
+    return _cost(replace(part, point=point, beyond=beyond), [p.raw for p in projections]) + worth
 
 
 def _best(

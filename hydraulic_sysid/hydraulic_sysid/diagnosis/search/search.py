@@ -23,6 +23,7 @@ from hydraulic_sysid.estimation.refinement import refined, usable
 
 from .candidates import candidates, observed, subsystem
 from .data_sheet import Deviation, priors, relaxed, restored, significant, suspects
+from .drive_faults import costs_with
 from .errors import DiagnosisError
 from .frozen_jacobian import Refit, as_it_is, refit
 from .holdout import Split, split
@@ -188,21 +189,31 @@ class Search:
             before = self.split
             self.split = replace(self.split, segments=faults[0].applied(base.linearisation))
             state = self.state(base.model, self._last)
-            if not material(base.misfit, state.misfit) or explained(base.misfit, state.misfit) < FURTHER:
+            worth = misfit(self.split, costs_with(state.linearisation, base.linearisation))
+            if not material(base.misfit, worth) or explained(base.misfit, worth) < FURTHER:
                 self.split = before
                 break
             self.faults.append(faults[0])
             base = self.judged(self.resized(state, before))
-        return base
+        return base if base.refits else self.rounded(base)
+
+    def rounded(self, base: SearchState) -> SearchState:
+        """A state with refits of the effects whose size records show by themselves.
+
+        Such as rounding pass for noise, so that they count even where nothing else is left.
+        """
+        at = base.linearisation
+        scores = score(at, [c for c in candidates(base.model) if observed(c)], record_features(at))
+        return replace(base, refits=[self.refit(base, s) for s in scores], scores=scores)
 
     def resized(self, state: SearchState, without: Split) -> SearchState:
         """A state that has the last fault named, fitted again while the fault's best size changes."""
         for _ in range(MOST_SIZES):
             old, new = self.faults[-1], resized(state.linearisation, self.faults[-1])
-            if abs(new.size - old.size) < max(SAME_SIZE * abs(old.size), 2.0 * new.standard_error):
+            if new is old or abs(new.size - old.size) < max(SAME_SIZE * abs(old.size), 2.0 * new.standard_error):
                 break
             self.faults[-1] = replace(new, reduction=old.reduction)
-            self.split = replace(self.split, segments=[new.hypothesis.applied(s, new.size) for s in without.segments])
+            self.split = replace(self.split, segments=new.on(without.segments))
             state = self.state(state.model, self._last)
         return state
 

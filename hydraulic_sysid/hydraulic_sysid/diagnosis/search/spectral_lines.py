@@ -20,6 +20,7 @@ _AROUND = 201  # bins
 _FINER = 4  # zero padding: bins between those of a record
 _BESIDE = 3.0  # Hz, within which side bands of a line lie
 _MOST = 2
+_VISIBLE = 0.3  # of a channel's noise, from which its steps are no mere rounding of a file
 _SLOWEST = 2.0  # Hz, slower is drift within a segment
 
 
@@ -27,7 +28,16 @@ def record_features(at: Linearisation) -> RecordFeatures:
     """Lines, and the step between position readings that all records share (0 where they have none)."""
     steps = [code_step(s.record["position"]) for s in at.split.segments]
     shared = float(np.median(steps)) if max(steps) < 1.01 * min(steps) else 0.0
+    if any(_converted(s) for s in at.split.segments):
+        shared = 0.0
     return RecordFeatures(spectral_lines(at.split.segments, at.residual), shared)
+
+
+def _converted(segments: Segments) -> bool:
+    """Whether the pressures, too, come in steps of about their noise: then a converter makes them, not the sensor."""
+    others = [c for c in segments.channels if c != "position"]
+    noise = dict(zip(segments.channels, segments.noise_std.tolist(), strict=True))
+    return any(code_step(segments.record[c]) > _VISIBLE * noise[c] for c in others)
 
 
 def spectral_lines(segments: Sequence[Segments], residuals: Sequence[Array]) -> tuple[float, ...]:

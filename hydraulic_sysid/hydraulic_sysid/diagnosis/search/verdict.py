@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity
@@ -12,9 +12,11 @@ from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
+from .drive_faults import DriveHypothesis
 from .nonparametric_curves import NonparametricCurve
 from .remainder import Remainder, negligible, remainders, spikes
 from .search import SearchResult
+from .whiteness import Whiteness, whiteness
 
 MISSING = "missing"
 INDISTINGUISHABLE = "indistinguishable"
@@ -25,12 +27,14 @@ OUTSIDE = "outside the library"
 
 MANY_SPIKES = 1e-4  # of all samples: more are a fault of the recording
 NO_EFFECT = "No effect of the library is missing."
+UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
 UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
 SMALL = 1.2  # mean square over noise below which more may be left …
 SMALL_UNEXPLAINED = 0.4  # … namely this share
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
+BELOW = 0.9  # residual over noise below which the noise model is doubted
 LARGE = 1.03  # residual over noise from which something is missing although no effect of the library is
 
 
@@ -57,6 +61,13 @@ class Verdict:
         """What was added and, where the data do not decide, what may be in its place."""
         tied = self.added if self.kind == INDISTINGUISHABLE else ()
         return list(dict.fromkeys([*self.added, *(o for name in tied for o in self.indistinguishable_from(name))]))
+
+
+def conclusive(result: SearchResult) -> SearchResult:
+    """The search without its effects where they leave much and the drive is not known well enough to blame physics."""
+    if result.added and drive_unknown(result) and kind_of(result, tied=False) == OUTSIDE:
+        return replace(result, final=result.base, misfits={}, competing={})
+    return result
 
 
 def judge(result: SearchResult) -> Verdict:
@@ -97,7 +108,8 @@ def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dic
 
 def unexplained_share(result: SearchResult) -> float:
     """Mean square beyond the noise, over that before anything was added (0…1)."""
-    before, after = (max(s.misfit.variance - 1.0 - UNSEEN, 0.0) for s in (result.base, result.final))
+    ends = (result.base.misfit, result.final.misfit)
+    before, after = (max(min(m.variance, m.typical) - 1.0 - UNSEEN, 0.0) for m in ends)
     return after / before if before > 0.0 else 0.0
 
 
@@ -108,7 +120,7 @@ def kind_of(result: SearchResult, tied: bool) -> str:
     little = typical <= LARGE**2 or (typical <= SMALL and negligible(remainders(result, result.final)))
     if not result.added:
         if not little and unexplained_share(result) > UNEXPLAINED:
-            return OUTSIDE
+            return RECORDING if drive_unknown(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
@@ -121,6 +133,11 @@ def kind_of(result: SearchResult, tied: bool) -> str:
 def faulty(result: SearchResult) -> bool:
     """Whether the recording, not the physics, is at fault."""
     return bool(result.faults) or any(s.share > MANY_SPIKES for s in spikes(result))
+
+
+def drive_unknown(result: SearchResult) -> bool:
+    """Whether the drive that was recorded is not the one that the valve got."""
+    return any(isinstance(f.hypothesis, DriveHypothesis) for f in result.faults)
 
 
 def strained(result: SearchResult) -> bool:
@@ -142,7 +159,7 @@ def place(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparametric
 def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
     """What a user reads first."""
     base, final = result.base.misfit.rms_validation, result.final.misfit.rms_validation
-    left = remainder_sentence(remainders(result, result.final))
+    left = " ".join([remainder_sentence(remainders(result, result.final)), *noise_sentences(result)])
     fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
     if verdict.kind == COMPLETE:
         return (
@@ -151,7 +168,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         )
     if verdict.kind == RECORDING:
         found = [*recording_sentences(result), *data_sheet_sentences(result)]
-        return " ".join(["Recording:", *found, fell, left, NO_EFFECT])
+        return " ".join(["Recording:", *found, fell, left, UNCERTAIN if drive_unknown(result) else NO_EFFECT])
     if verdict.kind == DATA_SHEET:
         return " ".join(["Data sheet:", *data_sheet_sentences(result), fell, left, NO_EFFECT])
     beside = [*data_sheet_sentences(result), *recording_sentences(result)]
@@ -184,6 +201,25 @@ def remainder_sentence(found: Sequence[Remainder]) -> str:
     sizes = _and([f"{quantity(r.beyond, UNITS[r.channel], 2)} of {TITLES[r.channel]}" for r in seen])
     worst = max(r.share for r in seen)
     return f"What remains beyond the noise is {sizes}, at most {percent(worst)} of the motion in a segment."
+
+
+def noise_sentences(result: SearchResult) -> list[str]:
+    """Where the residual is not the noise that it is taken for."""
+    found = whiteness(result, result.final)
+    return [s for w in found for s in (_coloured(w), _below(w)) if s]
+
+
+def _coloured(found: Whiteness) -> str:
+    if not found.coloured:
+        return ""
+    size = f"{found.correlation:.2g} over {quantity(found.lag, 's', 2)}"
+    return f"What is left of {TITLES[found.channel]} is coloured ({size}): errors of the model or noise on the drive."
+
+
+def _below(found: Whiteness) -> str:
+    if found.rms > BELOW:
+        return ""
+    return f"{TITLES[found.channel]} leaves {found.rms:.2g} × its noise: the noise was taken for larger than it is."
 
 
 def data_sheet_sentences(result: SearchResult) -> list[str]:

@@ -24,8 +24,7 @@ def worst_segments(result: SearchResult) -> list[dict[str, Any]]:
         segments = result.split.segments[i]
         measured = segments.measured[k]
         before, after = (
-            measured - segments.in_units(np.asarray(state.residual[i]))[k]
-            for state in (result.base, result.final)
+            measured - segments.in_units(np.asarray(state.residual[i]))[k] for state in (result.base, result.final)
         )
         index = int(segments.first[k]) + np.arange(segments.samples)
         rows.append(

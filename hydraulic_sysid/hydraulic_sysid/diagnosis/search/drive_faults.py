@@ -1,0 +1,99 @@
+"""A recorded drive that is not what the valve got: noise on the channel, or changes between two samples.
+
+Either way the drive is known but for disturbances of a known size in every segment. What they do to the channels is
+simulated once and joins the nuisance, so that no fit mistakes it for physics. More freedom always leaves less: the
+evidence of such a disturbance is what the sum of squares loses minus the growth of the log determinant of its
+covariance (marginal likelihood; Rasmussen & Williams, Gaussian Processes for Machine Learning, section 5.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array
+from hydraulic_sysid.estimation.noise import robust_noise_std
+from hydraulic_sysid.estimation.segments import Segments
+
+from .linearisation import Linearisation
+
+BENDS = 12  # of the drive in a segment, the sharpest, at which its mean between two samples is uncertain
+INSTANT = 3.0**-0.5  # of a sample: root mean square of how long before it a change lies that it shows first
+BLOCKS = 12  # of a segment, in each of which noise on the drive has a mean of its own
+
+Disturbed = Iterator[Array]
+
+
+@dataclass(frozen=True)
+class DriveHypothesis:
+    """A fault of the recorded drive, its ``text`` in words and its ``remedy``.
+
+    ``disturbances``: the drive (N,) and the indices (S, n) of the samples that each segment sees → drives (N,) that are
+    off by one standard deviation each; ``size`` [``unit``] of segments.
+    """
+
+    name: str
+    text: str
+    remedy: str
+    unit: str
+    size: Callable[[Segments], float]
+    disturbances: Callable[[Array, Array], Disturbed]
+    channels: tuple[str, ...] = ("drive",)
+
+    def applied(self, at: Linearisation, size: float = 1.0) -> list[Segments]:
+        """The linearisation's segments, their drive taken to have it, of a ``size`` over that of the hypothesis."""
+        point, found = at.point, []
+        for i, (segments, states) in enumerate(zip(point.shooting.segments, point.initial_states, strict=True)):
+            drive = segments.record["drive"]
+            inside = segments.first[:, None] + np.arange(segments.samples - 1)
+
+            def seen(values: Array, i: int = i, segments: Segments = segments, states: Array = states) -> Array:
+                return segments.recorded(point.shooting.driven(point.plant, i, states, values))
+
+            base = seen(drive)
+            columns = [size * (seen(moved) - base) for moved in self.disturbances(drive, inside)]
+            disturbance = np.stack(columns, axis=-1)
+            nuisance = np.concatenate((segments.nuisance, segments.whitened(disturbance)), axis=-1)
+            found.append(replace(segments, disturbance=disturbance, nuisance=nuisance))
+        return found
+
+
+def costs_with(at: Linearisation, before: Linearisation) -> list[Array]:
+    """Costs (S,) per record, with what the freedom of disturbances that ``before`` did not have is worth."""
+    every = zip(at.costs, at.point.projections, before.point.projections, strict=True)
+    if all(s.disturbance.shape[-1] == 0 for s in at.split.segments):
+        return at.costs
+    return [cost + new.log_determinant - old.log_determinant for cost, new, old in every]
+
+
+def _bends(drive: Array, inside: Array) -> Disturbed:
+    change = np.diff(drive, prepend=drive[0], append=drive[-1])
+    bend = np.abs(np.diff(change))  # at a sample, and so on either side of it
+    bend = np.maximum(bend, np.append(bend[1:], 0.0))
+    sharpest = np.argsort(-bend[inside], axis=1)[:, :BENDS]
+    for place in np.take_along_axis(inside, sharpest, axis=1).T:
+        moved = drive.copy()
+        moved[place] += INSTANT * bend[place]
+        yield moved
+
+
+def _blocks(drive: Array, inside: Array) -> Disturbed:
+    std = robust_noise_std(drive)
+    for block in np.array_split(inside, BLOCKS, axis=1):
+        moved = drive.copy()
+        moved[block] += std / block.shape[1] ** 0.5
+        yield moved
+
+
+BETWEEN_SAMPLES = DriveHypothesis(
+    "drive_between_samples", "the drive changed between the samples of the record, {size} apart",
+    "record as often as the drive is put out", "s", lambda s: s.record.dt, _bends,
+)  # fmt: skip
+NOISY_DRIVE = DriveHypothesis(
+    "drive_noise", "the recorded drive carries noise of {size} that the valve does not get",
+    "record the command itself, or average its measurement over each sample", "V",
+    lambda s: robust_noise_std(s.record["drive"]), _blocks,
+)  # fmt: skip
+DRIVE_HYPOTHESES: Sequence[DriveHypothesis] = (BETWEEN_SAMPLES, NOISY_DRIVE)
