@@ -26,6 +26,7 @@ MOST_BANDWIDTH = 40.0  # rad/s
 FULL = 10.0  # V
 HARD = 0.8  # force of a stop from top speed over supply times area, beyond which moves begin and end softly
 PERIOD = 5.0  # s, of the slow experiment
+ON = 0.75  # share of the moves in open loop that go on in the direction of the last: they reach the ends of the travel
 SWEPT = (0.5, 60.0)  # of the resonance, and Hz: end of the sweep
 
 
@@ -56,19 +57,20 @@ def _slow(g: Geometry, _: np.random.Generator, closed: bool) -> np.ndarray:
 
 def _steps(g: Geometry, rng: np.random.Generator, closed: bool) -> np.ndarray:
     """Moves at constant speed between rests; in closed loop as fast as the actuator can, where it bears that."""
-    speed, at, k = np.zeros(SAMPLES), 0.0, 0
+    speed, at, k, way = np.zeros(SAMPLES), 0.0, 0, 1.0
     while k < SAMPLES:
+        way = way if rng.random() < (0.5 if closed else ON) else -way
         if closed:
-            move = rng.uniform(0.02, 0.9 * TRAVEL) * rng.choice((-1.0, 1.0))
+            move = rng.uniform(0.02, 0.9 * TRAVEL) * way
             pace = 3.0 if g.kick < HARD else rng.uniform(0.3, 0.7)
             rest = rng.uniform(0.1, 0.4) + (abs(move) * g.crossing if pace > 1.0 else 0.0)
         else:
             pace = rng.uniform(0.2, 0.7)
-            move = pace * max(rng.uniform(0.08, 0.3), 0.06 / g.crossing) * rng.choice((-1.0, 1.0))
+            move = pace * max(rng.uniform(0.08, 0.3), 0.06 / g.crossing) * way
             move = min(max(move, -TRAVEL), TRAVEL)
             rest = rng.uniform(0.05, 0.3) * (rng.random() < 0.4)
         if abs(at + move) > TRAVEL:
-            move = -move
+            move, way = -move, -way
         lasts = max(round(abs(move) * g.crossing / pace * RATE), 1)
         speed[k : k + lasts] = move * g.crossing / (lasts / RATE)
         at, k = at + move, k + lasts + round(rest * RATE)
