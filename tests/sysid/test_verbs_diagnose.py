@@ -33,7 +33,7 @@ def test_the_hidden_dead_band_is_found_and_its_width_too(run: Path) -> None:
     assert found["verdict"]["subsystem"] == "valve"
     first = found["effects"][0]
     assert (first["name"], first["rank"], first["added"]) == ("valve_deadband", 1, True)
-    assert first["residual_before"] > 5.0 > 1.1 > first["residual_after"]
+    assert first["residual_before"] > 3.0 > 1.1 > first["residual_after"]
     width = first["parameters"][0]
     assert width["value"] == pytest.approx(0.03, rel=0.02) and width["standard_error"] > 0.0
     assert [s["name"] for s in found["residual"]["after_each_effect"]] == ["valve_deadband"]
