@@ -201,6 +201,26 @@ def test_a_reduction_must_show_on_segments_for_fitting_and_for_validation() -> N
     assert not material(before, Misfit(1.2e5, 5.5e4, 100_000, 50_000))
     assert not material(before, Misfit(1.2e5 - 30.0, 6e4 - 15.0, 100_000, 50_000))  # chance has more
     assert explained(before, Misfit(1.0e5, 5.0e4, 100_000, 50_000)) == pytest.approx(1.0)
+
+
+def by_segment(cost: list[float]) -> Misfit:
+    """Of forty segments of 1000 values, every third for validation."""
+    costs, fitted = np.array(cost), np.arange(len(cost)) % 3 < 2
+    count = np.full(costs.size, 1000)
+    return Misfit(
+        costs[fitted].sum(), costs[~fitted].sum(), 1000 * fitted.sum(), 1000 * (~fitted).sum(),
+        by_segment=costs, counted=count, fitted=fitted,
+    )  # fmt: skip
+
+
+def test_no_single_segment_turns_what_counts() -> None:
+    before, wild = [1100.0] * 40, 26  # a segment for validation whose initial state is not found
+    after = [1000.0] * 40
+    worse = [5000.0 if i == wild else c for i, c in enumerate(after)]
+    start = by_segment([4000.0 if i == wild else c for i, c in enumerate(before)])
+    assert material(start, by_segment(worse)) and explained(start, by_segment(worse)) == pytest.approx(1.0)
+    alone = by_segment([1000.0 if i == wild else c for i, c in enumerate(before)])
+    assert not material(start, alone)  # one segment that gains is no effect either
     assert before.excess == pytest.approx(3e4)
 
 

@@ -16,6 +16,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose
+from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, split
 from hydraulic_sysid.report import render
 
 Array = np.ndarray
@@ -127,3 +128,42 @@ def test_spikes_are_counted_and_do_not_count(model: Model, runs) -> None:
     (spikes,) = found["recording"]["spikes"]
     assert spikes["channel"] == "pressure_a" and 27 <= spikes["count"] <= 30
     assert 0.95 < found["residual"]["after"]["validation"] < 1.05
+
+
+def test_noise_on_the_recorded_drive_is_a_matter_of_the_recording(model: Model, runs) -> None:
+    draw, noisy = np.random.default_rng(3), []
+    for record in records(runs):
+        drive = record["drive"] + 0.03 * draw.standard_normal(len(record))
+        noisy.append(Record.sampled(record.name, DT, {**record.channels, "drive": drive}))
+    found = document(diagnose(model, noisy))
+    assert found["verdict"]["kind"] == "recording", found["verdict"]["text"]
+    (fault,) = found["recording"]["faults"]
+    assert (fault["name"], fault["unit"]) == ("drive_noise", "V")
+    assert fault["size"] == pytest.approx(0.03, rel=0.1)
+
+
+def test_a_slow_log_of_a_fast_drive_is_a_matter_of_the_recording(model: Model) -> None:
+    """Whoever logs every fourth sample of a drive that jumps at any time does not know what the valve got."""
+    plant, draw, slow = Plant(model), np.random.default_rng(9), []
+    for number in range(3):
+        drive = np.repeat(draw.uniform(-3.0, 3.0, 40), draw.integers(60, 140, 40))
+        run = plant.simulate(drive, DT, plant.initial_state())
+        seen = {c: np.asarray(getattr(run, c)) + std * draw.standard_normal(drive.size) for c, std in NOISE.items()}
+        slow.append(Record.sampled(f"log_{number}", 4 * DT, {c: v[::4] for c, v in ({"drive": drive} | seen).items()}))
+    found = document(diagnose(model, slow))
+    assert found["verdict"]["kind"] == "recording", found["verdict"]["text"]
+    assert [f["name"] for f in found["recording"]["faults"]][:1] == ["drive_between_samples"]
+
+
+def test_the_residual_is_tested_for_whiteness(model: Model, runs) -> None:
+    for row in document(diagnose(model, records(runs, filtered=True)))["whiteness"]:
+        assert not row["coloured"] and abs(row["correlation"]) < 0.1 and 0.9 < row["rms"] < 1.1
+
+
+def test_of_very_long_records_blocks_are_left_out(model: Model) -> None:
+    time = DT * np.arange(400_000)
+    channels = {c: np.sin(time) for c in ("drive", *NOISE)}
+    long = split([Record.sampled("long", DT, channels)], (), model.kind, 0.5)
+    assert 0.4 * MOST_VALUES < sum(s.measured.size for s in long.segments) <= MOST_VALUES
+    (segments,), (fit,) = long.segments, long.fit
+    assert 0.6 < fit.mean() < 0.72 and segments.first[-1] > 0.98 * time.size

@@ -122,17 +122,17 @@ def document(
                     "share": s.share,
                     "places": [{"record": record, "time": time} for record, time in s.places[:MOST_PLACES]],
                 }
-                for s in spikes(result)
+                for s in spikes(result.split)
             ],
             "mains_lines": {
                 c: sorted({f for s in result.split.segments if c in s.channels for f in s.hum[s.channels.index(c)]})
                 for c in result.split.channels
             },
         },
-        "whiteness": [vars(w) | {"coloured": w.coloured} for w in whiteness(result, final)],
+        "whiteness": [vars(w) | {"coloured": w.coloured} for w in whiteness(result.split, final.residual)],
         "remainder": [
             {"channel": r.channel, "beyond_noise": r.beyond, "noise": r.noise, "motion": r.motion, "share": r.share}
-            for r in remainders(result, final)
+            for r in remainders(result.split, final.residual)
         ],
         "parameters": _parameters(final.model, known, final.linearisation.parameters.keys),
         "unexplained_share": verdicts.unexplained_share(result),

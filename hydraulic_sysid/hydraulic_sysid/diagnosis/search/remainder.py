@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from .search import SearchResult, SearchState
+from hydraulic_sim.arrays import Array
+
+from .holdout import Split
 
 NEGLIGIBLE = 0.003  # of the motion in a segment: no law of a library is that of a bench to three parts in a thousand
 
@@ -36,12 +39,12 @@ class Spikes:
     places: list[tuple[str, float]]
 
 
-def remainders(result: SearchResult, state: SearchState) -> list[Remainder]:
-    """Per channel, over all records."""
-    squares = {c: np.zeros(3) for c in result.split.channels}
+def remainders(split: Split, residual: Sequence[Array]) -> list[Remainder]:
+    """Per channel, over all records, of whitened residuals (S, m) each."""
+    squares = {c: np.zeros(3) for c in split.channels}
     count = dict.fromkeys(squares, 0)
-    for segments, residual in zip(result.split.segments, state.residual, strict=True):
-        left = segments.in_units(np.asarray(residual))
+    for segments, own in zip(split.segments, residual, strict=True):
+        left = segments.in_units(np.asarray(own))
         moved = segments.measured - segments.measured.mean(axis=1, keepdims=True)
         for c, channel in enumerate(segments.channels):
             kept = ~segments.outliers[:, :, c]
@@ -62,12 +65,12 @@ def negligible(found: list[Remainder]) -> bool:
     return bool(found) and all(r.share < NEGLIGIBLE for r in found)
 
 
-def spikes(result: SearchResult) -> list[Spikes]:
+def spikes(split: Split) -> list[Spikes]:
     """Per channel that has some."""
     found = []
-    for channel in result.split.channels:
+    for channel in split.channels:
         places, total = list[tuple[str, float]](), 0
-        for s in result.split.segments:
+        for s in split.segments:
             if channel in s.channels:
                 out = s.outliers[:, :, s.channels.index(channel)]
                 total += out.size

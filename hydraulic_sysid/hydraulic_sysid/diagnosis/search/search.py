@@ -30,6 +30,7 @@ from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import Misfit, explained, material, misfit
 from .recording_faults import RecordingFault, recording_faults, resized
+from .remainder import negligible, remainders
 from .score_test import CandidateScore, score
 from .spectral_lines import record_features
 
@@ -178,7 +179,7 @@ class Search:
         """A state with its candidates explored, and with every fault of the recording that explains more than they."""
         while base.misfit.variance - 1.0 > NOTHING_LEFT:
             base = self.explore(base)
-            if len(self.faults) == MOST_FAULTS:
+            if len(self.faults) == MOST_FAULTS or negligible(remainders(self.split, base.residual)):
                 break
             self.say("faults of the recording")
             faults = recording_faults(base.linearisation)

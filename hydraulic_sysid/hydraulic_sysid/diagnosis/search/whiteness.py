@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
-from .search import SearchResult, SearchState
+from hydraulic_sim.arrays import Array
+
+from .holdout import Split
 
 LAGS = 20  # samples
 COLOURED = 0.1  # correlation from which a residual is called coloured: over thousands of samples any model has some
@@ -33,16 +36,16 @@ class Whiteness:
         return abs(self.correlation) > COLOURED
 
 
-def whiteness(result: SearchResult, state: SearchState) -> list[Whiteness]:
-    """Per channel of all records."""
+def whiteness(split: Split, residual: Sequence[Array]) -> list[Whiteness]:
+    """Per channel, over all records, of whitened residuals (S, m) each."""
     found = []
-    for channel in result.split.channels:
+    for channel in split.channels:
         products, squares, count, dt = np.zeros(LAGS), 0.0, 0, 0.0
-        for segments, residual in zip(result.split.segments, state.residual, strict=True):
+        for segments, own in zip(split.segments, residual, strict=True):
             if channel not in segments.channels:
                 continue
             c = segments.channels.index(channel)
-            values, dt = segments.by_channel(residual)[:, :, c], segments.record.dt
+            values, dt = segments.by_channel(own)[:, :, c], segments.record.dt
             squares += float(np.sum(values**2))
             count += int(np.sum(~segments.outliers[:, :, c]))
             lags = min(LAGS, values.shape[1] - 1)
