@@ -19,7 +19,7 @@ from hydraulic_sysid.estimation.segments import Segments
 
 from .linearisation import Linearisation
 
-BENDS = 12  # of the drive in a segment, the sharpest, at which its mean between two samples is uncertain
+BENDS = 12  # of the drive in a segment, the sharpest, about which its mean between two samples is unknown
 INSTANT = 3.0**-0.5  # of a sample: root mean square of how long before it a change lies that it shows first
 BLOCKS = 12  # of a segment, in each of which noise on the drive has a mean of its own
 
@@ -31,13 +31,15 @@ class DriveHypothesis:
     """A fault of the recorded drive, its ``text`` in words and its ``remedy``.
 
     ``disturbances``: the drive (N,) and the indices (S, n) of the samples that each segment sees → drives (N,) that are
-    off by one standard deviation each; ``size`` [``unit``] of segments.
+    off by one standard deviation each; ``size`` [``unit``] of segments: disturbances are of it if ``exact``, else up to
+    it.
     """
 
     name: str
     text: str
     remedy: str
     unit: str
+    exact: bool
     size: Callable[[Segments], float]
     disturbances: Callable[[Array, Array], Disturbed]
     channels: tuple[str, ...] = ("drive",)
@@ -89,11 +91,11 @@ def _blocks(drive: Array, inside: Array) -> Disturbed:
 
 BETWEEN_SAMPLES = DriveHypothesis(
     "drive_between_samples", "the drive changed between the samples of the record, {size} apart",
-    "record as often as the drive is put out", "s", lambda s: s.record.dt, _bends,
+    "record as often as the drive is put out", "s", False, lambda s: s.record.dt, _bends,
 )  # fmt: skip
 NOISY_DRIVE = DriveHypothesis(
     "drive_noise", "the recorded drive carries noise of {size} that the valve does not get",
-    "record the command itself, or average its measurement over each sample", "V",
+    "record the command itself, or average its measurement over each sample", "V", True,
     lambda s: robust_noise_std(s.record["drive"]), _blocks,
 )  # fmt: skip
 DRIVE_HYPOTHESES: Sequence[DriveHypothesis] = (BETWEEN_SAMPLES, NOISY_DRIVE)

@@ -118,10 +118,11 @@ def recording_faults(at: Linearisation) -> list[RecordingFault]:
         found += [fault] if fault is not None else []
     if not any(s.disturbance.shape[-1] for s in point.shooting.segments):
         for one in DRIVE_HYPOTHESES:
-            lower, half = (before - _cost_disturbed(part, one, size) for size in (1.0, 0.5))
-            # Disturbances of that size would show more than there is where half of them explains it better.
+            lower = before - _cost_disturbed(part, one, 1.0)
+            if one.exact and lower < before - _cost_disturbed(part, one, 0.5):
+                continue  # disturbances of that size would show more than there is
             size = float(np.median([one.size(s) for s in at.split.segments]))
-            found += [RecordingFault(one, size, 0.0, lower / share)] if lower > max(half, 0.0) else []
+            found += [RecordingFault(one, size, 0.0, lower / share)] if lower > 0.0 else []
     return sorted(found, key=lambda f: -f.reduction)
 
 
