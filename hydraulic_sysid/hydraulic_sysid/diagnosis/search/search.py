@@ -103,6 +103,16 @@ class SearchState:
 
 
 @dataclass(frozen=True)
+class FaultFit:
+    """A state on records that are taken to have a fault, and its misfit with what the fault's freedom is worth."""
+
+    fault: RecordingFault
+    state: SearchState
+    split: Split
+    misfit: Misfit
+
+
+@dataclass(frozen=True)
 class SearchResult:
     """Where a search ended.
 
@@ -186,16 +196,13 @@ class Search:
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
                 break
-            self.say(f"fitting with: {faults[0].text}")
-            before = self.split
-            self.split = replace(self.split, segments=faults[0].applied(base.linearisation))
-            state = self.state(base.model, self._last)
-            worth = misfit(self.split, costs_with(state.linearisation, base.linearisation))
-            if not material(base.misfit, worth) or explained(base.misfit, worth) < FURTHER:
-                self.split = before
+            near = [f for f in faults if f.reduction >= NEAR * faults[0].reduction][:FULL]
+            found = min((self.with_fault(base, f) for f in near), key=lambda f: f.misfit.total)
+            if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
-            self.faults.append(faults[0])
-            base = self.judged(self.resized(state, before))
+            self.faults.append(found.fault)
+            self.split = found.split
+            base = self.judged(found.state)
         return base if base.refits else self.rounded(base)
 
     def rounded(self, base: SearchState) -> SearchState:
@@ -207,16 +214,22 @@ class Search:
         scores = score(at, [c for c in candidates(base.model) if observed(c)], record_features(at))
         return replace(base, refits=[self.refit(base, s) for s in scores], scores=scores)
 
-    def resized(self, state: SearchState, without: Split) -> SearchState:
-        """A state that has the last fault named, fitted again while the fault's best size changes."""
+    def with_fault(self, base: SearchState, fault: RecordingFault) -> FaultFit:
+        """A state fitted to records that are taken to have a fault, again while the fault's best size changes."""
+        self.say(f"fitting with: {fault.text}")
+        before = self.split
+        self.split = replace(before, segments=fault.applied(base.linearisation))
+        state = self.state(base.model, self._last)
         for _ in range(MOST_SIZES):
-            old, new = self.faults[-1], resized(state.linearisation, self.faults[-1])
-            if new is old or abs(new.size - old.size) < max(SAME_SIZE * abs(old.size), 2.0 * new.standard_error):
+            new = resized(state.linearisation, fault)
+            if new is fault or abs(new.size - fault.size) < max(SAME_SIZE * abs(fault.size), 2.0 * new.standard_error):
                 break
-            self.faults[-1] = replace(new, reduction=old.reduction)
-            self.split = replace(self.split, segments=new.on(without.segments))
+            fault = replace(new, reduction=fault.reduction)
+            self.split = replace(before, segments=fault.on(before.segments))
             state = self.state(state.model, self._last)
-        return state
+        worth = misfit(self.split, costs_with(state.linearisation, base.linearisation))
+        found, self.split = FaultFit(fault, state, self.split, worth), before
+        return found
 
     def _laws(self, model: Model) -> list[str]:
         """Parameters that stand for a law: the free ones, not the numbers that a data sheet states."""
