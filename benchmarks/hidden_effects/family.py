@@ -14,6 +14,7 @@ from .geometry import GEOMETRIES, Geometry
 
 WHAT = {"none": 0.3, "effect": 0.4, "datum": 0.15, "recording": 0.15}  # what is hidden, and how often
 KINDS = {"none": "none", "effect": "single", "datum": "datum", "recording": "recording"}
+AMBIGUOUS = ("sensor_scale",)  # areas within their tolerance, and masses, say the same
 APART = 100_000  # between the benches' seeds of two draws
 
 
@@ -32,10 +33,11 @@ def member(seed: int, number: int, what: str | None = None) -> Bench:
     kind, seed = KINDS[what], seed * APART + number
     if kind == "none":
         return Bench(kind, seed=seed, setting=setting)
-    name = str(rng.choice(possible(geometry, kind)))
-    return Bench(kind, (name,), str(rng.choice(SEVERITIES)), seed, setting)
+    severity = str(rng.choice(SEVERITIES))
+    return Bench(kind, (str(rng.choice(possible(geometry, kind, severity))),), severity, seed, setting)
 
 
-def possible(geometry: Geometry, kind: str) -> list[str]:
-    """What of a kind can be hidden in a geometry, since the records of that would show it."""
-    return [name for name in catalogue.KINDS[kind] if name not in geometry.never]
+def possible(geometry: Geometry, kind: str, severity: str) -> list[str]:
+    """What of a kind can be hidden in a geometry, since its records would show it."""
+    hidden = {*AMBIGUOUS, *geometry.never, *(geometry.faint if severity == "mild" else ())}
+    return [name for name in catalogue.KINDS[kind] if name not in hidden]

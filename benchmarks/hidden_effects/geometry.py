@@ -43,13 +43,15 @@ DIRECT = 1e4  # motor's pole over the spool's of a direct-driven valve: none
 @dataclass(frozen=True)
 class Geometry:
     """``sheet``: values of the data sheet that differ from `parameters.PLAIN`; ``pressures``: whether they are
-    recorded; ``never``: what cannot be hidden here, since nothing would show it."""
+    recorded; ``never``: what cannot be hidden here, and ``faint``: what cannot be if it is mild, since the usually free
+    parameters take up so much of it that less than 3 % beyond the noise is left."""
 
     name: str
     title: str
     sheet: dict[str, float]
     pressures: bool = True
     never: tuple[str, ...] = ()
+    faint: tuple[str, ...] = ()
 
     @cached_property
     def plain(self) -> dict[str, float]:
@@ -146,7 +148,7 @@ def _unequal(bore: float, rod: float, dead: float) -> dict[str, float]:
 
 
 _EVERY = (
-    Geometry("bench", "Double-rod actuator of 1.5 m", {}, never=("dead_volume_a",)),
+    Geometry("bench", "Double-rod actuator of 1.5 m", {}, never=("dead_volume_a",), faint=("entrained_air",)),
     Geometry("press", "Press axis with a differential cylinder 63/36 mm of 0.4 m, servo valve of 60 Hz",
              _unequal(63, 36, 2e-4) | {
                  "mass": 250.0, "stroke": 0.4, "bulk_modulus": 1.3e9, "supply": 16e6, "tank": 0.1e6,
@@ -157,25 +159,30 @@ _EVERY = (
                  "mass": 5.0, "stroke": 0.1, "bulk_modulus": 1.4e9, "supply": 21e6, "tank": 0.5e6,
                  "valve_flow": 1.667e-4, "viscous": 60.0, "coulomb": 50.0, "leakage": 2e-13, "bristle": 8e-6,
                  "spool_frequency": 200.0, "spool_damping": 0.7, "spool_motor": DIRECT,
-                 "stop_stiffness": 5e7, "stop_damping": 20.0}),
+                 "stop_stiffness": 5e7, "stop_damping": 20.0, "position_noise": 4e-6},
+             faint=("presliding", "entrained_air", "sensor_offset")),
     Geometry("long", "Double-rod actuator 160/110 mm of 3 m that moves 20 t",
              _equal(160, 110, 4e-3) | {
                  "mass": 20e3, "stroke": 3.0, "bulk_modulus": 1.35e9, "supply": 21e6, "tank": 0.4e6,
                  "valve_flow": 3.75e-3, "viscous": 6e3, "coulomb": 4e3, "leakage": 4e-12, "bristle": 3e-5,
                  "stop_stiffness": 2e9, "stop_damping": 2e4},
-             never=("end_cushion",)),
+             never=("end_cushion", "entrained_air", "pressures_late"),
+             faint=("stribeck_friction", "viscosity_drift", "valve_flow_saturation")),
     Geometry("hoist", "Differential cylinder 80/45 mm of 0.8 m, rod down, with 1.2 t hanging on it",
              _unequal(80, 45, 6e-4) | {
                  "mass": 1200.0, "stroke": 0.8, "bulk_modulus": 1.4e9, "supply": 18e6, "tank": 0.3e6,
                  "valve_flow": 1.1e-3, "viscous": 1500.0, "coulomb": 500.0, "leakage": 5e-13, "bristle": 2e-5,
                  "load": 1200.0 * GRAVITY, "stop_stiffness": 6e8, "stop_damping": 2e3},
-             never=("moving_mass",)),
+             never=("moving_mass",), faint=("friction_asymmetry",)),
     Geometry("medium", "Double-rod actuator 50/36 mm of 0.6 m, its pressures not recorded",
              _equal(50, 36, 8e-5) | {
                  "mass": 120.0, "stroke": 0.6, "bulk_modulus": 1.5e9, "supply": 14e6, "tank": 0.2e6,
                  "valve_flow": 3e-4, "viscous": 300.0, "coulomb": 150.0, "leakage": 4e-13, "bristle": 1e-5,
                  "stop_stiffness": 2e8, "stop_damping": 200.0},
-             pressures=False),
+             pressures=False,
+             never=("entrained_air", "sensor_offset", "pressure_offset", "supply_pressure", "dead_volume_a",
+                    "transducer_lag", "pressures_late"),
+             faint=("stribeck_friction", "end_cushion", "external_leakage")),
 )  # fmt: skip
 
 GEOMETRIES = {g.name: g for g in _EVERY}

@@ -24,7 +24,7 @@ BANDWIDTH = (
 )
 MOST_BANDWIDTH = 40.0  # rad/s
 FULL = 10.0  # V
-HARD = 0.8  # force of a stop from top speed over supply times area, beyond which moves begin and end softly
+HARD = 0.8  # kick of a geometry beyond which the reference does not outrun the actuator
 PERIOD = 5.0  # s, of the slow experiment
 ON = 0.75  # share of the moves in open loop that go on in the direction of the last: they reach the ends of the travel
 SWEPT = (0.5, 60.0)  # of the resonance, and Hz: end of the sweep
@@ -62,10 +62,10 @@ def _steps(g: Geometry, rng: np.random.Generator, closed: bool) -> np.ndarray:
         way = way if rng.random() < (0.5 if closed else ON) else -way
         if closed:
             move = rng.uniform(0.02, 0.9 * TRAVEL) * way
-            pace = 3.0 if g.kick < HARD else rng.uniform(0.3, 0.7)
+            pace = 3.0 if g.kick < HARD else rng.uniform(0.3, 0.9)
             rest = rng.uniform(0.1, 0.4) + (abs(move) * g.crossing if pace > 1.0 else 0.0)
         else:
-            pace = rng.uniform(0.2, 0.7)
+            pace = rng.uniform(0.2, 0.9)
             move = pace * max(rng.uniform(0.08, 0.3), 0.06 / g.crossing) * way
             move = min(max(move, -TRAVEL), TRAVEL)
             rest = rng.uniform(0.05, 0.3) * (rng.random() < 0.4)
@@ -97,8 +97,8 @@ def _random(g: Geometry, rng: np.random.Generator, closed: bool) -> np.ndarray:
 
 
 def _soft(g: Geometry, speed: np.ndarray) -> np.ndarray:
-    """The profile's jumps drawn out over most of a period of the resonance, where the mass would strain the oil."""
-    width = round(0.8 / g.resonance * RATE) if g.kick > HARD else 1
+    """The profile's jumps drawn out over up to most of a period of the resonance, as hard as they strain the oil."""
+    width = max(round(0.8 * min(g.kick, 1.0) / g.resonance * RATE), 1)
     return np.convolve(speed, np.ones(width) / width)[: len(speed)]
 
 
