@@ -203,7 +203,7 @@ class Search:
             self.faults.append(found.fault)
             self.split = found.split
             base = self.judged(found.state)
-        return base if base.refits else self.rounded(base)
+        return base if base.scores else self.rounded(base)
 
     def rounded(self, base: SearchState) -> SearchState:
         """A state with refits of the effects whose size records show by themselves.
@@ -245,6 +245,7 @@ class Search:
         strict = replace(strict, refits=base.refits, scores=base.scores)
         done = strict if final is base else self.state(restored(final.model, self.given, []), self._last)
         moved: list[Deviation] = []
+        bare = done
         while significant(done.misfit.total - final.misfit.total, final.misfit.count, final.misfit.variance):
             named = [d.key for d in moved]
             tried = []
@@ -256,10 +257,29 @@ class Search:
             if deviation is None or not significant(deviation.cost, best.misfit.count, best.misfit.variance):
                 break
             moved, done = [*moved, replace(deviation, value=best.model.value(deviation.key))], best
+        moved = [replace(d, instead=self.instead(bare, done, d, moved)) for d in moved]
         misfits = found.misfits
         if misfits:
             misfits = {**misfits, next(reversed(misfits)): done.misfit}
         return replace(found, base=strict, final=done, misfits=misfits, moved=tuple(moved))
+
+    def instead(
+        self, bare: SearchState, done: SearchState, deviation: Deviation, moved: Sequence[Deviation]
+    ) -> tuple[str, ...]:
+        """Effects that explain what another value of a number does, as far as these records can say.
+
+        ``bare``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
+        """
+        self.say(f"fitting without another {deviation.key}")
+        others = [d.key for d in moved if d.key != deviation.key]
+        without = self.state(restored(done.model, self.given, others), self._last) if others else bare
+        promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
+        found = []
+        for r in [r for r in self.explore(without, LATER_REFITS).refits if r.misfit.total < promising][:FULL]:
+            reached = self.state(r.refit.model, self._last).misfit
+            if not significant(reached.total - done.misfit.total, reached.count, reached.variance):
+                found.append(r.name)
+        return tuple(found)
 
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
