@@ -7,12 +7,15 @@ from typing import Any
 from rich.console import Console
 
 from hydraulic_node_utils import tables
+from hydraulic_sysid.diagnosis.check import warnings
 
 _SHOWN = 8
 
 
 def show(result: dict[str, Any], console: Console) -> None:
-    """The table of effects and the sentence a user reads."""
+    """What contradicts the model file, the table of effects and the sentence a user reads."""
+    for warning in warnings(result.get("check", ())):
+        console.print(f"warning: {warning}")
     rows = [
         (
             "→" if row["added"] else "", row["name"], row["subsystem"], f"{row['residual_before']:.4g}",

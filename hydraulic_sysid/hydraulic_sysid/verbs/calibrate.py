@@ -2,6 +2,8 @@
 
 Every record is cut into short segments whose initial states are fitted too, so that the drift of an integrating
 plant does not hide the rest. Writes calibrate.json, a page (report.html) and the calibrated model (model.yaml).
+
+With --check nothing is fitted: what the records contradict in the model file, or cannot identify (check.json).
 """
 
 from __future__ import annotations
@@ -16,19 +18,27 @@ from rich.console import Console
 
 from hydraulic_node_utils import tables
 from hydraulic_sim.model_file import load_model, save_model
+from hydraulic_sysid.data.results import verb_of
 from hydraulic_sysid.diagnosis.calibrate import FitSettings, calibrate
+from hydraulic_sysid.diagnosis.check import check, warnings
+from hydraulic_sysid.verbs import _check_table
 from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
 examples:
   python -m hydraulic_sysid calibrate --model sample_bench --record examples/sample_bench --out runs/calibrated
   python -m hydraulic_sysid calibrate --model my.yaml --record a.csv b.csv --holdout-record c.csv --out runs/mine
+  python -m hydraulic_sysid calibrate --check --model my.yaml --record a.csv b.csv --out runs/checked
+
+exit codes: 0 the fit has converged, or nothing contradicts the model file; 1 it has not, or something does; 2 unusable
+input
 """
 
 
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
     parser = opt.parser("calibrate", __doc__, EPILOG)
+    parser.add_argument("--check", action="store_true", help="fit nothing: check the model file against the records")
     opt.add_model_option(parser)
     opt.add_record_options(parser)
     parser.add_argument("--holdout-record", metavar="PATH", type=Path, nargs="+", help="records the fit never sees")
@@ -37,7 +47,18 @@ def main(argv: list[str] | None = None) -> int:
     )
     opt.add_segment_option(parser)
     parser.add_argument("--robust", action="store_true", help="let outliers count less (soft L1)")
-    return opt.run(parser, _calibrate, _show, argv)
+    return opt.run(parser, _work, _show, argv)
+
+
+def _work(options: argparse.Namespace, say: opt.Say) -> opt.Done:
+    return _check(options, say) if options.check else _calibrate(options, say)
+
+
+def _check(options: argparse.Namespace, say: opt.Say) -> opt.Done:
+    model = load_model(options.model)
+    records = opt.read_records(options) + opt.read_kept_back(options.holdout_record, options)
+    result = check(model, records, options.segment, options.free, say)
+    return opt.Done(result, good=not warnings(result["findings"]))
 
 
 def _calibrate(options: argparse.Namespace, say: opt.Say) -> opt.Done:
@@ -51,6 +72,10 @@ def _calibrate(options: argparse.Namespace, say: opt.Say) -> opt.Done:
 
 
 def _show(result: dict[str, Any], console: Console) -> None:
+    _check_table.show(result, console) if verb_of(result) == "check" else _show_fit(result, console)
+
+
+def _show_fit(result: dict[str, Any], console: Console) -> None:
     values = []
     for p in result["parameters"]:
         unit = "" if p["unit"] == "1" else f" {p['unit']}"

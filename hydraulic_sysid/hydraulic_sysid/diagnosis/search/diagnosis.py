@@ -11,6 +11,8 @@ from typing import Any
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.check import contradictions
+from hydraulic_sysid.diagnosis.check import rows as check_rows
 from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locate
 from hydraulic_sysid.estimation.fit import FitSettings
 
@@ -53,7 +55,10 @@ def diagnose(
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
     say = progress or (lambda _: None)
-    found = verdicts.conclusive(Search.of(model, records, validation, settings or FitSettings(), say).run())
+    search = Search.of(model, records, validation, settings or FitSettings(), say)
+    say("the records against the model file")
+    checked = contradictions(model, [*records, *validation])
+    found = verdicts.conclusive(search.run())
     verdict = verdicts.judge(found)
     outside = verdict.kind == verdicts.OUTSIDE
     # Where most is left, what was added is a proxy for something else, and bends curves and balances.
@@ -62,7 +67,7 @@ def diagnose(
     curves = nonparametric_curves(suspect.linearisation, say) if outside else []
     known = parameter_errors(found.final.linearisation)
     found = replace(found, moved=[with_error(d, known) for d in found.moved])
-    whole = document(found, verdict, known, curves)
+    whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
     done, alternatives = finished(found, known), verdicts.alternatives(found, verdict)
     before, after = found.base.model, found.final.model if found.added or found.moved else None
     suspected = None if not outside else before if proxy else after

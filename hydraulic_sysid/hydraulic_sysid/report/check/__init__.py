@@ -1,0 +1,3 @@
+"""A model file against records, before anything is fitted."""
+
+SCHEMA = "hydraulic_sysid.check/1"

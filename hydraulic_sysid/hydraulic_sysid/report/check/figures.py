@@ -1,0 +1,1 @@
+"""Figures of a check: none, its findings are words and numbers."""
