@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
@@ -15,7 +17,7 @@ from hydraulic_sysid.estimation.errors import CalibrationError
 from . import experiment, flows, forces, pressures, recording, travel
 from .finding import CONTRADICTION, DOUBTFUL, NOT_IDENTIFIABLE, SEVERITIES, Finding, merged
 from .identifiability import not_identifiable
-from .observed import FEWEST, Observed, Windows
+from .observed import FEWEST_SAMPLES, Observed, Windows
 from .senses import senses
 from .units import wrong_units
 
@@ -70,8 +72,8 @@ def contradictions(model: Model, records: Sequence[Record]) -> list[Finding]:
         raise CalibrationError("there is no record to check the model against")
     for record in records:
         record.require("drive", "position", error=CalibrationError)
-        if len(record) < FEWEST:
-            raise CalibrationError(f"{record.name}: {len(record)} samples; at least {FEWEST} are needed")
+        if len(record) < FEWEST_SAMPLES:
+            raise CalibrationError(f"{record.name}: {len(record)} samples; at least {FEWEST_SAMPLES} are needed")
     plant = Plant(model)
     frequency = experiment.resonance(model)
     every = [Observed.of(record, plant, frequency) for record in records]
@@ -97,12 +99,13 @@ def _of_all(records: Sequence[Observed], plant: Plant) -> list[Finding]:
         return found
     every = Windows.joined([s.windows for s in records])
     steady = every.flowing
-    found += forces.areas(steady, plant)
+    measured = steady.subset(np.isfinite(steady.pressure_a + steady.pressure_b))
+    found += forces.areas(measured, plant)
     # With areas in the wrong place neither supply nor flow means anything.
     if any(f.severity == CONTRADICTION for f in found):
         return found
-    supply = pressures.steady_supply(steady, plant) or pressures.blocked_supply(every, plant)
-    return found + supply + pressures.steady_ratio(steady, plant) + flows.valve_flow(steady, plant)
+    supply = pressures.steady_supply(measured, plant) or pressures.blocked_supply(every, plant)
+    return found + supply + pressures.steady_ratio(measured, plant) + flows.valve_flow(steady, plant)
 
 
 def rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:

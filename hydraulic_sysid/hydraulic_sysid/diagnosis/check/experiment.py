@@ -71,7 +71,7 @@ def _slow(seen: Observed, frequency: float) -> Finding:
         rate,
         _PER_PERIOD * frequency,
         "Hz",
-        (seen.record.name,),
+        seen.named,
     )
 
 

@@ -23,8 +23,8 @@ from hydraulic_sysid.data.display import number, percent, quantity
 from hydraulic_sysid.diagnosis.locate.balances import root
 
 from .finding import DOUBTFUL, Finding, by_bounds
-from .observed import Windows
-from .pressures import FEWEST, wide
+from .observed import FEWEST, Windows
+from .pressures import wide
 
 _DROP = 0.02  # of the supply: over a smaller drop the transducers' offsets decide
 _MOST = 400  # windows in which the model's opening is asked for
@@ -54,7 +54,7 @@ def valve_flow(windows: Windows, plant: Plant) -> list[Finding]:
         return []
     found = _size(gains, plant)
     if len(gains) == 2 and not found:
-        found = _directions(gains, plant)
+        found = _directions(gains)
     return found
 
 
@@ -64,18 +64,17 @@ def gain(windows: Windows, plant: Plant, direction: int) -> Gain | None:
     tank, supply = plant.value("tank_pressure"), plant.value("supply_pressure")
     least, small = _DROP * supply, plant.value("orifice_transition")
     known = np.isfinite(windows.pressure_supply)
+    land = plant.value("valve_flow") / math.sqrt(plant.value("valve_drop"))
     for side, drop in (
         (emptied, getattr(windows, f"pressure_{emptied}") - tank),
         (filled, np.where(known, windows.pressure_supply, supply) - getattr(windows, f"pressure_{filled}")),
     ):
-        chosen = drop > least
-        if chosen.sum() < FEWEST:
-            continue
-        used = _thinned(windows.subset(chosen))
-        drop = _thinned_array(drop[chosen])
-        land = plant.value("valve_flow") / math.sqrt(plant.value("valve_drop"))
-        needed = plant.value(f"piston_area_{side}") * np.abs(used.velocity) / (land * root(drop, small))
-        return _gain(np.abs(openings(used, plant)), needed)
+        if np.sum(drop > least) >= FEWEST:
+            used = np.flatnonzero(drop > least)
+            used = used[:: -(-used.size // _MOST)]
+            chosen = windows.subset(used)
+            swallowed = plant.value(f"piston_area_{side}") * np.abs(chosen.velocity)
+            return _gain(np.abs(openings(chosen, plant)), swallowed / (land * root(drop[used], small)))
     if np.isfinite(windows.pressure_a).any() or np.isfinite(windows.pressure_b).any() or len(windows) < FEWEST:
         return None
     return _without_pressures(wide(windows), plant)
@@ -133,16 +132,15 @@ def _size(gains: Sequence[Gain], plant: Plant) -> list[Finding]:
     return [Finding("valve_flow", "valve_flow", severity, text, remedy, measured, stated, "m^3/s")]
 
 
-def _directions(gains: Sequence[Gain], plant: Plant) -> list[Finding]:
+def _directions(gains: Sequence[Gain]) -> list[Finding]:
     out, back = gains
     ratio = max(out.low / back.high, back.low / out.high)
     if ratio <= 1.0 + _APART:
         return []
     faster = "Extending" if out.low > back.high else "Retracting"
-    stated = plant.value("piston_area_a") / plant.value("piston_area_b")
     text = f"{faster} is {percent(ratio - 1.0)} faster against the model than the other way."
     remedy = "Look at the areas, a load or the valve: valve_gain_asymmetry, valve_null_bias."
-    return [Finding("directions", "piston_area_b", DOUBTFUL, text, remedy, ratio, 1.0, "1")] if stated else []
+    return [Finding("directions", "piston_area_b", DOUBTFUL, text, remedy, ratio, 1.0)]
 
 
 def _bounds(model: Model) -> str:
@@ -150,11 +148,3 @@ def _bounds(model: Model) -> str:
     if entry is None or entry.bounds is None:
         return ""
     return f" (bounds {quantity(entry.bounds[0], 'm^3/s')} to {quantity(entry.bounds[1], 'm^3/s')})"
-
-
-def _thinned(windows: Windows) -> Windows:
-    return windows.subset(np.arange(len(windows))[:: -(-len(windows) // _MOST)])
-
-
-def _thinned_array(values: Array) -> Array:
-    return values[:: -(-len(values) // _MOST)]

@@ -15,9 +15,9 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import number, percent, quantity
 
 from .finding import CONTRADICTION, DOUBTFUL, Finding, excess
-from .observed import Observed, Windows
-from .pressures import FEWEST, supply_and_ratio
-from .senses import SURE, correlation, inertial
+from .observed import FEWEST, Observed, Windows
+from .pressures import supply_and_ratio
+from .senses import SURE, correlation
 
 _LARGE = 0.1  # of what the supply can push: friction and a load that the model does not know of stay below
 _BETTER = 1.0 / 3.0  # of that force is left with other areas, for these to be the reason
@@ -27,9 +27,9 @@ _MOST = 400  # windows in which the model's own friction and load are asked for
 
 def areas(windows: Windows, plant: Plant) -> list[Finding]:
     """Areas that leave a large force in steady motion, and those that do not."""
-    if len(windows) < FEWEST or not np.isfinite(windows.pressure_a + windows.pressure_b).all():
+    if len(windows) < FEWEST:
         return []
-    windows = windows.subset(np.arange(len(windows))[:: -(-len(windows) // _MOST)])
+    windows = windows.some(_MOST)
     a, b = plant.value("piston_area_a"), plant.value("piston_area_b")
     own = friction_and_load(windows, plant)
     able = plant.value("supply_pressure") * max(a, b)
@@ -68,7 +68,7 @@ def friction_and_load(windows: Windows, plant: Plant) -> Array:
 
 def mass(records: Sequence[Observed]) -> list[Finding]:
     """The moving mass as the record shows it in which force and acceleration correlate best."""
-    shown = [(correlation(*left), seen, left) for seen in records if (left := inertial(seen, seen.force)) is not None]
+    shown = [(correlation(*left), seen, left) for seen in records if (left := seen.inertia(seen.force)) is not None]
     together, seen, (force, acceleration) = max(shown, key=lambda one: one[0], default=(0.0, records[0], _NOTHING))
     if together < SURE:
         return []
@@ -83,4 +83,4 @@ def mass(records: Sequence[Observed]) -> list[Finding]:
         f"{percent(measured / stated - 1.0)} off the model's {number(stated)} kg."
     )
     remedy = "Correct moving_mass (or the areas), or look for a load that swings along."
-    return [Finding("mass", "moving_mass", DOUBTFUL, text, remedy, measured, stated, "kg", (seen.record.name,))]
+    return [Finding("mass", "moving_mass", DOUBTFUL, text, remedy, measured, stated, "kg", seen.named)]

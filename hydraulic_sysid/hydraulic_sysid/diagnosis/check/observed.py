@@ -20,17 +20,19 @@ from hydraulic_sysid.estimation.noise import noise_std, spikes, without
 
 MEASURED = ("position", "pressure_a", "pressure_b", "pressure_supply")
 """Channels of sensors."""
-FEWEST = 20  # samples that a noise estimate needs
+FEWEST_SAMPLES = 20  # that a noise estimate needs
+FEWEST = 10  # windows, half a second, that must show something
+ROUGH = 5.0  # samples of the resonance's period below which sampling shows it roughly
 
 _SPAN, _LONGEST = 0.05, 0.2  # s of a window: a record of a second has twenty; and at most
 _PERIODS = 2.0  # of the model's resonance that a window lasts, so that it averages it
-ROUGH = 5.0  # samples of its period below which sampling shows it roughly, and forces sampled with it mean nothing
 _SAMPLES = 5  # of a window at least
 _MOST = 4000  # windows of a record that are looked at, spread over it
 _CHANGE = 0.3  # of the drive within a window, or of the velocity between its halves: more is no steady motion
 _BEFORE = 0.5  # of the drive, that it may have differed in the window before: what a dead time still delays
 _MOVED = 20.0  # standard deviations of the position's noise that a piston must move within a window, …
 _LEAST_MOVED = 1e-5  # … and this part of the stroke: a record without noise
+_DIRECTION = 0.25  # of that: what it must move to have a direction
 _END = 0.02  # of the travel, next to its ends
 
 
@@ -74,6 +76,10 @@ class Windows:
         """With the piston at rest and the drive held."""
         return self.subset(self.held & ~self.moving)
 
+    def some(self, most: int) -> Windows:
+        """At most so many of them, spread over all."""
+        return self.subset(np.arange(0, len(self), max(1, -(-len(self) // most))))
+
     def going(self, direction: int) -> Windows:
         """Those in which drive and motion have this sign."""
         return self.subset((direction * self.opening > 0.0) & (direction * self.velocity > 0.0))
@@ -94,11 +100,16 @@ class Observed:
 
     @classmethod
     def of(cls, record: Record, plant: Plant, resonance: float | None) -> Observed:
-        """Of the channels that the record has, at least `FEWEST` samples each."""
+        """Of the channels that the record has, at least `FEWEST_SAMPLES` each."""
         channels = [c for c in MEASURED if c in record and (plant.model.kind == "hydraulic" or c == "position")]
         signals = {c: without(record[c], spikes(record[c])) for c in channels}
         noise = {c: noise_std(v) for c, v in signals.items()}
         return cls(record, plant, {**signals, "drive": record["drive"]}, noise, resonance)
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The name of the record, as findings have it."""
+        return (self.record.name,)
 
     @property
     def opening(self) -> Array:
@@ -145,25 +156,30 @@ class Observed:
         total = np.concatenate(([0.0], np.cumsum(self.signals[channel])))
         return (total[first + self.samples] - total[first]) / self.samples
 
-    def inertia(self, force: Array) -> tuple[Array, Array, Array, Array]:
-        """Acceleration, velocity, position and a ``force`` (N,) [N] over triangles of two windows, (M,) each.
+    def inertia(self, force: Array | None) -> tuple[Array, Array] | None:
+        """A force (N,) [N] and the acceleration (M,) over triangles of two windows; None where they cannot be told.
 
-        Without those in which the piston comes to rest at an end of its travel: a stop carries part of the force.
+        Each without what is constant or goes with direction, velocity or position: load, friction and springs. Those
+        triangles are left out in which the piston comes to rest at an end of its travel: a stop carries the force.
         """
         n, x = self.samples, self.signals["position"]
-        kernel = np.bartlett(2 * n + 1)
         rough = self.resonance is not None and ROUGH * self.resonance * self.record.dt > 1.0
-        if len(x) <= 2 * n or rough:
-            return np.empty(0), np.empty(0), np.empty(0), np.empty(0)
-        span = n * self.record.dt
+        if force is None or rough or len(x) < (FEWEST + 2) * n:
+            return None
+        span, kernel = n * self.record.dt, np.bartlett(2 * n + 1)
         weighed = fftconvolve(force, kernel / kernel.sum(), mode="valid")[::n]
         ends = x[: (len(x) - 1) // n * n + 1 : n]
-        acceleration = (ends[2:] - 2.0 * ends[1:-1] + ends[:-2]) / span**2
-        found = acceleration, (ends[2:] - ends[:-2]) / (2.0 * span), ends[1:-1], weighed[: acceleration.size]
-        steps, room = np.abs(np.diff(ends)), _END * float(np.ptp(x))
-        at_end = (ends[1:-1] - x.min() < room) | (x.max() - ends[1:-1] < room)
-        free = ~(at_end & (np.minimum(steps[1:], steps[:-1]) <= self.least))
-        return found[0][free], found[1][free], found[2][free], found[3][free]
+        middle, steps, room = ends[1:-1], np.diff(ends), _END * float(np.ptp(x))
+        at_end = (middle - x.min() < room) | (x.max() - middle < room)
+        free = ~(at_end & (np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])) <= self.least))
+        velocity = (steps[1:] + steps[:-1]) / (2.0 * span)
+        direction = np.sign(velocity) * (np.abs(velocity) * span > _DIRECTION * self.least)
+        both = np.column_stack((weighed[: middle.size], np.diff(steps) / span**2))[free]
+        if len(both) < FEWEST:
+            return None
+        known, _ = np.linalg.qr(np.column_stack((np.ones(middle.size), direction, velocity, middle))[free])
+        both = both - known @ (known.T @ both)
+        return both[:, 0], both[:, 1]
 
     @property
     def force(self) -> Array | None:

@@ -18,7 +18,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import number, percent, quantity
 
 from .finding import CONTRADICTION, DOUBTFUL, Finding, by_share
-from .observed import Observed, Windows
+from .observed import FEWEST, Observed, Windows
 
 VACUUM = -1e5  # Pa against the atmosphere: no pressure lies below
 _TIMES_NOISE = 6.0  # standard deviations by which a pressure must stand out
@@ -28,8 +28,8 @@ GAUGE_CLASS = 0.025  # of the supply, from which a steady pressure is doubtful: 
 _OTHER = 0.2  # of the supply: droop, back pressure and transducers together stay below
 _RATIO = 0.05  # of the area ratio, from which it is doubtful: drawings and pairs of equal lands are nearer
 _EMPTY = 0.05  # of the supply: what a chamber that nothing flows out of may be above the tank
+_OPEN = 0.2  # of full opening, beyond any overlap
 _WIDE = 0.5  # of the largest openings of all steady motion: at smaller ones leakage and overlap share the flow
-FEWEST = 10  # windows, half a second, that steady motion must fill
 
 
 def beyond_supply(seen: Observed) -> list[Finding]:
@@ -40,14 +40,16 @@ def beyond_supply(seen: Observed) -> list[Finding]:
             continue
         margin = _margin(seen, name)
         often = float(np.mean(seen.signals[name] - seen.signals.get("pressure_supply", supply) > margin))
-        against = getattr(seen.windows.flowing.going(filling), name) > supply + margin
+        filled = seen.windows.flowing.going(filling)
+        source = np.where(np.isfinite(filled.pressure_supply), filled.pressure_supply, supply)
+        against = getattr(filled, name) > source + margin
         severity = CONTRADICTION if against.sum() >= FEWEST else DOUBTFUL
         if often > _OFTEN:
             largest = float(np.quantile(seen.signals[name], 1.0 - 0.5 * _OFTEN))
             text = f"{name} is above the supply ({quantity(supply, 'Pa')}) for {percent(often)} of the time"
             text += ", even while oil flows in from there." if severity == CONTRADICTION else "."
             remedy = "Correct supply_pressure, or the transducer's scale."
-            found.append(Finding("above_supply", name, severity, text, remedy, largest, supply, "Pa", _in(seen)))
+            found.append(Finding("above_supply", name, severity, text, remedy, largest, supply, "Pa", seen.named))
     return found
 
 
@@ -66,7 +68,7 @@ def below_tank(seen: Observed) -> list[Finding]:
             text = f"{name} is below the tank ({quantity(tank, 'Pa')}) for {percent(often)} of the time"
             text += ", even while oil flows out to there." if severity == CONTRADICTION else "."
             remedy = "Correct tank_pressure, or the transducer's offset; cavitation lasts a moment only."
-            found.append(Finding("below_tank", name, severity, text, remedy, least, tank, "Pa", _in(seen)))
+            found.append(Finding("below_tank", name, severity, text, remedy, least, tank, "Pa", seen.named))
     return found
 
 
@@ -78,7 +80,7 @@ def below_vacuum(seen: Observed) -> list[Finding]:
             least = float(np.quantile(seen.signals[name], 0.5 * _OFTEN))
             text = f"{name} goes down to {quantity(least, 'Pa')}, below vacuum."
             remedy = "Correct the sign or the offset of the transducer (column map: sign, offset)."
-            found.append(Finding("vacuum", name, CONTRADICTION, text, remedy, least, VACUUM, "Pa", _in(seen)))
+            found.append(Finding("vacuum", name, CONTRADICTION, text, remedy, least, VACUUM, "Pa", seen.named))
     return found
 
 
@@ -86,7 +88,7 @@ def measured_supply(seen: Observed) -> list[Finding]:
     """A measured supply pressure that is another than the file's."""
     if "pressure_supply" not in seen.signals:
         return []
-    return _other_supply(seen.plant, float(np.median(seen.signals["pressure_supply"])), "as measured", _in(seen))
+    return _other_supply(seen.plant, float(np.median(seen.signals["pressure_supply"])), "as measured", seen.named)
 
 
 def supply_and_ratio(windows: Windows, plant: Plant) -> tuple[float, float] | None:
@@ -113,7 +115,7 @@ def steady_supply(windows: Windows, plant: Plant) -> list[Finding]:
 def blocked_supply(windows: Windows, plant: Plant) -> list[Finding]:
     """At a stop with the valve open one chamber stands at supply pressure."""
     still = windows.resting
-    still = still.subset(np.abs(still.opening) > _WIDE)
+    still = still.subset(np.abs(still.opening) > _OPEN)
     filled = np.where(still.opening > 0.0, still.pressure_a, still.pressure_b)
     emptied = np.where(still.opening > 0.0, still.pressure_b, still.pressure_a)
     # The other one is then empty; else the piston moves, and its sensor does not show it.
@@ -163,7 +165,3 @@ def _other_supply(plant: Plant, measured: float, how: str, records: tuple[str, .
 def _margin(seen: Observed, name: str) -> float:
     """What transducer, gauge and noise may be off [Pa]."""
     return _GAUGE * seen.plant.value("supply_pressure") + _TIMES_NOISE * seen.noise[name]
-
-
-def _in(seen: Observed) -> tuple[str, ...]:
-    return (seen.record.name,)

@@ -30,7 +30,7 @@ def constant(seen: Observed) -> list[Finding]:
             shown = quantity(value, "Pa")
             text = f"{channel} stays at {shown} throughout while the piston moves."
             remedy = "Look at the sensor and its column; leave the channel out of the record until it works."
-            found.append(Finding("constant", channel, CONTRADICTION, text, remedy, value, None, "Pa", _in(seen)))
+            found.append(Finding("constant", channel, CONTRADICTION, text, remedy, value, None, "Pa", seen.named))
     return found
 
 
@@ -50,7 +50,7 @@ def clipped(seen: Observed) -> list[Finding]:
             unit = seen.record.unit(channel)
             text = f"{channel} sits at exactly {quantity(edge, unit)} for {percent(share)} of the time."
             remedy = "The converter is at its end: enlarge its range, or cut these parts off (--window)."
-            found.append(Finding("clipped", channel, DOUBTFUL, text, remedy, edge, None, unit, _in(seen)))
+            found.append(Finding("clipped", channel, DOUBTFUL, text, remedy, edge, None, unit, seen.named))
     return found
 
 
@@ -68,7 +68,7 @@ def frozen(seen: Observed) -> list[Finding]:
         f"All sensors stand still to the last digit for up to {quantity(seconds, 's')}, though they flicker elsewhere."
     )
     remedy = "The logger has filled a gap: split the record there, or cut it (--window)."
-    return [Finding("gap", "position", DOUBTFUL, text, remedy, seconds, None, "s", _in(seen))]
+    return [Finding("gap", "position", DOUBTFUL, text, remedy, seconds, None, "s", seen.named)]
 
 
 def beyond_limit(seen: Observed) -> list[Finding]:
@@ -78,7 +78,7 @@ def beyond_limit(seen: Observed) -> list[Finding]:
         return []
     text = f"The drive reaches {quantity(largest, 'V')}; the model's saturates at {quantity(limit, 'V')}."
     remedy = "The drive was logged before its limit (the model clips it), or drive_limit is wrong."
-    return [Finding("drive_limit", "drive_limit", DOUBTFUL, text, remedy, largest, limit, "V", _in(seen))]
+    return [Finding("drive_limit", "drive_limit", DOUBTFUL, text, remedy, largest, limit, "V", seen.named)]
 
 
 def saturated(seen: Observed) -> list[Finding]:
@@ -88,18 +88,14 @@ def saturated(seen: Observed) -> list[Finding]:
         return []
     text = f"The drive is at its limit for {percent(share)} of the time."
     remedy = "Record a smaller drive as well: effects around the valve's centre do not show at full opening."
-    return [Finding("saturated", "drive", NOT_IDENTIFIABLE, text, remedy, share, None, "1", _in(seen))]
+    return [Finding("saturated", "drive", NOT_IDENTIFIABLE, text, remedy, share, None, "1", seen.named)]
 
 
 def reader_notes(seen: Observed) -> list[Finding]:
     """What the reader of the file assumed or filled in: resampled gaps, the command taken for the drive."""
     channels = {note: note.partition(":")[0] for note in seen.record.notes}
     remedy = "Nothing, where that is meant."
-    return [Finding("reader", c, NOTE, f"{note}.", remedy, records=_in(seen)) for note, c in channels.items()]
-
-
-def _in(seen: Observed) -> tuple[str, ...]:
-    return (seen.record.name,)
+    return [Finding("reader", c, NOTE, f"{note}.", remedy, records=seen.named) for note, c in channels.items()]
 
 
 def _longest(flags: Mask) -> int:

@@ -10,12 +10,10 @@ from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.display import percent
 
 from .finding import CONTRADICTION, DOUBTFUL, Finding
-from .observed import Observed
+from .observed import FEWEST, Observed
 
-_FEWEST = 10  # windows, half a second, that must show a direction
 _AGREE = 0.8  # share of windows in which drive and motion go the same way: null bias and dead time leave most
 SURE = 0.9  # correlation of force and acceleration beyond friction, from which inertia makes most of both
-_FASTER = 1e-3  # m/s: a slower piston has no direction
 
 
 def senses(records: Sequence[Observed]) -> list[list[Finding]]:
@@ -56,8 +54,7 @@ def _of_record(seen: Observed, together: float) -> list[Finding]:
 def drive_agrees(seen: Observed) -> float | None:
     """Share of the windows of steady motion in which the piston goes where the drive points; None for too few."""
     flowing = seen.windows.flowing
-    flowing = flowing.subset(np.abs(flowing.velocity) > _FASTER)
-    if len(flowing) < _FEWEST or seen.plant.model.kind == "mechanical":
+    if len(flowing) < FEWEST or seen.plant.model.kind == "mechanical":
         return None
     return float(np.mean(flowing.opening * flowing.velocity > 0.0))
 
@@ -68,7 +65,7 @@ def pushing(seen: Observed) -> float:
     if {"pressure_a", "pressure_b"} <= seen.signals.keys():
         a, b = seen.plant.value("piston_area_a"), seen.plant.value("piston_area_b")
         forces.append(b * seen.signals["pressure_a"] - a * seen.signals["pressure_b"])
-    parts = [inertial(seen, force) for force in forces]
+    parts = [seen.inertia(force) for force in forces]
     return max((correlation(*part) for part in parts if part is not None), key=abs, default=0.0)
 
 
@@ -78,19 +75,7 @@ def correlation(force: Array, acceleration: Array) -> float:
     return float(force @ acceleration) / size if size > 0.0 else 0.0
 
 
-def inertial(seen: Observed, force: Array | None) -> tuple[Array, Array] | None:
-    """A force (N,) and the acceleration (M,), without what is constant or goes with direction, velocity or position."""
-    if force is None:
-        return None
-    acceleration, velocity, position, weighed = seen.inertia(force)
-    if acceleration.size < _FEWEST:
-        return None
-    direction = np.sign(velocity) * (np.abs(velocity) > _FASTER)
-    known, _ = np.linalg.qr(np.column_stack((np.ones(velocity.size), direction, velocity, position)))
-    return weighed - known @ (known.T @ weighed), acceleration - known @ (known.T @ acceleration)
-
-
 def _finding(
     seen: Observed, subject: str, text: str, remedy: str, measured: float | None, severity: str = CONTRADICTION
 ) -> Finding:
-    return Finding("sign", subject, severity, text, remedy, measured, None, "1", (seen.record.name,))
+    return Finding("sign", subject, severity, text, remedy, measured, None, "1", seen.named)

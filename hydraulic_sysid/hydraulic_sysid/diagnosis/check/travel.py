@@ -22,7 +22,7 @@ def beyond_stroke(records: Sequence[Observed]) -> list[Finding]:
     if "stroke" not in records[0].plant.model.entries:
         return []
     plant = records[0].plant
-    low, high = readings_at_stops(plant)
+    low, high = readings_at_stops(plant, records[0].record.dt)
     ends = [(s.signals["position"], _TIMES_NOISE * s.noise["position"], s.record.name) for s in records]
     first, retracted = min((float(x.min()) + noise, name) for x, noise, name in ends)
     last, extended = max((float(x.max()) - noise, name) for x, noise, name in ends)
@@ -41,9 +41,9 @@ def beyond_stroke(records: Sequence[Observed]) -> list[Finding]:
     return [Finding("zero", "position", severity, text, remedy, off, 0.0, "m", names)]
 
 
-def readings_at_stops(plant: Plant) -> tuple[float, float]:
+def readings_at_stops(plant: Plant, dt: float) -> tuple[float, float]:
     """What the model's position sensor reads at both stops [m]."""
     states = np.tile(plant.initial_state().states, (2, 1))
     states[:, 0] = [-0.5 * plant.value("stroke"), 0.5 * plant.value("stroke")]
-    read = plant.predict(np.zeros(2), 1e-3, np.zeros(2, dtype=np.int64), 1, states)["position"][:, 0]
+    read = plant.predict(np.zeros(2), dt, np.zeros(2, dtype=np.int64), 1, states)["position"][:, 0]
     return float(read[0]), float(read[1])
