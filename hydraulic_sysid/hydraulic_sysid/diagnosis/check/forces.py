@@ -41,9 +41,11 @@ def areas(windows: Windows, plant: Plant) -> list[Finding]:
     if now <= _LARGE * able:
         return []
     text = f"In steady motion the pressures leave a force of {quantity(now, 'N')} that the model does not have"
-    if left(b, a) < _BETTER * now:
-        text += f", and {quantity(left(b, a), 'N')} with the areas in each other's place."
-        remedy = "Swap piston_area_a and piston_area_b, or the columns of the pressures."
+    swapped = {"areas": left(b, a), "pressures": left(-b, -a)}
+    which = min(swapped, key=swapped.__getitem__)
+    if swapped[which] < _BETTER * now:
+        text += f", and {quantity(swapped[which], 'N')} with the {which} in each other's place."
+        remedy = "Swap piston_area_a and piston_area_b, or else the columns of pressure_a and pressure_b."
         return [Finding("areas", "piston_area_a", CONTRADICTION, text, remedy, b, a, "m^2")]
     both = supply_and_ratio(windows, plant)
     if both is not None and left(a, a / both[1]) < _BETTER * now:

@@ -21,17 +21,19 @@ from hydraulic_sysid.estimation.noise import noise_std, spikes, without
 MEASURED = ("position", "pressure_a", "pressure_b", "pressure_supply")
 """Channels of sensors."""
 FEWEST_SAMPLES = 20  # that a noise estimate needs
-FEWEST = 10  # windows, half a second, that must show something
+FEWEST = 6  # windows that must show something
 ROUGH = 5.0  # samples of the resonance's period below which sampling shows it roughly
 
-_SPAN, _LONGEST = 0.05, 0.2  # s of a window: a record of a second has twenty; and at most
-_PERIODS = 2.0  # of the model's resonance that a window lasts, so that it averages it
+_PERIODS = 2.0  # of the model's resonance that a window lasts, so that it averages it, …
+_LONGEST = 0.2  # … but no longer [s], …
+_SPAN = 0.05  # … and so long where nothing oscillates [s]
 _SAMPLES = 5  # of a window at least
 _MOST = 4000  # windows of a record that are looked at, spread over it
 _CHANGE = 0.3  # of the drive within a window, or of the velocity between its halves: more is no steady motion
 _BEFORE = 0.5  # of the drive, that it may have differed in the window before: what a dead time still delays
 _MOVED = 20.0  # standard deviations of the position's noise that a piston must move within a window, …
 _LEAST_MOVED = 1e-5  # … and this part of the stroke: a record without noise
+_FAST, _CLEARLY = 0.95, 2.0  # quantile of the motion within windows that must be so many times that
 _DIRECTION = 0.25  # of that: what it must move to have a direction
 _END = 0.02  # of the travel, next to its ends
 
@@ -118,9 +120,18 @@ class Observed:
 
     @cached_property
     def samples(self) -> int:
-        """Of a window."""
-        span = _SPAN if self.resonance is None else min(max(_SPAN, _PERIODS / self.resonance), _LONGEST)
-        return max(_SAMPLES, round(span / self.record.dt))
+        """Of a window: as long as the resonance asks for, or until fast motion stands out of the noise within it."""
+        span, x, dt = (
+            _SPAN if self.resonance is None else _PERIODS / self.resonance,
+            self.signals["position"],
+            self.record.dt,
+        )
+        n = max(_SAMPLES, round(min(span, _LONGEST) / dt))
+        while 2 * n * dt < _LONGEST and 2 * n < len(x):
+            if np.quantile(np.abs(x[n::n] - x[:-n:n]), _FAST) > _CLEARLY * self.least:
+                break
+            n *= 2
+        return n
 
     @property
     def least(self) -> float:

@@ -17,7 +17,7 @@ _RUN = 20  # equal samples in a row at least that make a channel frozen or clipp
 _TIMES = 3.0  # … and so many times the longest run that its noise makes
 _BEYOND = 1.01  # of the drive's limit: what rounding and the amplifier's tolerance allow
 _AT_LIMIT = 0.995  # of the limit
-_SATURATED = 0.5  # share of a record at the limit from which the valve is little more than a switch
+_SATURATED = 0.8  # share of a record at the limit from which the valve is little more than a switch
 
 
 def constant(seen: Observed) -> list[Finding]:

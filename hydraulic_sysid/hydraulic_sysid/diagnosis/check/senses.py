@@ -13,13 +13,14 @@ from .finding import CONTRADICTION, DOUBTFUL, Finding
 from .observed import FEWEST, Observed
 
 _AGREE = 0.8  # share of windows in which drive and motion go the same way: null bias and dead time leave most
+_OPPOSITE = 0.5  # of the changes of both pressures with the direction, that must add up to a force
 SURE = 0.9  # correlation of force and acceleration beyond friction, from which inertia makes most of both
 
 
 def senses(records: Sequence[Observed]) -> list[list[Finding]]:
     """Of every record: inverted or swapped channels, or a drive that hardly decides where the piston goes."""
-    own = [pushing(seen) for seen in records]
-    # A slow record shows no acceleration; the sensors are those of the others.
+    own = [max(pushing(seen), dissipating(seen), key=abs) for seen in records]
+    # Not every record shows acceleration or friction; the sensors are those of the others.
     best = max(own, key=abs, default=0.0)
     return [_of_record(seen, one if abs(one) >= SURE else best) for seen, one in zip(records, own, strict=True)]
 
@@ -28,7 +29,7 @@ def _of_record(seen: Observed, together: float) -> list[Finding]:
     agree = drive_agrees(seen)
     inverted = agree is not None and agree < 1.0 - _AGREE
     known, braking = abs(together) >= SURE, together <= -SURE
-    inertia = f"force and acceleration correlate by {together:.2f}"
+    inertia = f"force and acceleration (or direction) correlate by {together:.2f}"
     if seen.plant.model.kind == "mechanical":
         if not braking:
             return []
@@ -67,6 +68,23 @@ def pushing(seen: Observed) -> float:
         forces.append(b * seen.signals["pressure_a"] - a * seen.signals["pressure_b"])
     parts = [seen.inertia(force) for force in forces]
     return max((correlation(*part) for part in parts if part is not None), key=abs, default=0.0)
+
+
+def dissipating(seen: Observed) -> float:
+    """Correlation of force and direction in steady motion, beyond load and spring: friction takes, and never gives.
+
+    0 where both pressures change alike with the direction: areas that are wrong make any force of that.
+    """
+    w = seen.windows.flowing
+    a, b = (seen.plant.value(f"piston_area_{s}") * getattr(w, f"pressure_{s}") for s in "ab")
+    ways = min(np.sum(w.velocity > 0.0), np.sum(w.velocity < 0.0))
+    if ways < FEWEST or not np.isfinite(a - b).all():
+        return 0.0
+    known, _ = np.linalg.qr(np.column_stack((np.ones(len(w)), w.position)))
+    both = np.column_stack((a, b, np.sign(w.velocity)))
+    a, b, direction = (both - known @ (known.T @ both)).T
+    opposite = abs((a - b) @ direction) > _OPPOSITE * (abs(a @ direction) + abs(b @ direction))
+    return correlation(a - b, direction) if opposite else 0.0
 
 
 def correlation(force: Array, acceleration: Array) -> float:
