@@ -38,6 +38,7 @@ def test_the_hidden_dead_band_is_found_and_its_width_too(run: Path) -> None:
     assert width["value"] == pytest.approx(0.03, rel=0.02) and width["standard_error"] > 0.0
     assert [s["name"] for s in found["residual"]["after_each_effect"]] == ["valve_deadband"]
     assert len(found["effects"]) == len({e["name"] for e in found["effects"]}) > 30
+    assert {f["severity"] for f in found["check"]} <= {"note"}
     assert {b["name"] for b in found["balances"]} >= {"force", "flow_a", "flow_b"}
     assert set(found["noise_std"]) == {"position", "pressure_a", "pressure_b"}
 
@@ -85,6 +86,7 @@ NUMBER = {
     "chi_square_difference": 4e3,
     "instead": ["backlash"],
 }
+CONTRADICTION = {"severity": "contradiction", "text": "The travel is too long.", "remedy": "Mend the stroke."}
 DATA_SHEET = {"data_sheet": [NUMBER]}
 FAULT = {
     "name": "drive",
@@ -106,6 +108,7 @@ OUTSIDE = {"nonparametric_curves": [CURVE], "nearest_effects": ["backlash"]}
         ("outside the library", OUTSIDE, "The shape of what is left; 40.0\u00a0%; library: backlash; Write an effect"),
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
         ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
+        ("complete", {"check": [CONTRADICTION]}, "First: The travel is too long. Mend the stroke."),
         ("data sheet", DATA_SHEET, "Ask for the true supply_pressure; 158.1; backlash"),
         ("recording", RECORDING, "The drive was late: mend it.; Look for a loose contact; Spikes in pressure"),
     ],
