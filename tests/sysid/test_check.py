@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hostile_page import assert_cannot_inject
-from rich.console import Console
 
 from hidden_effects import axis, benches
 from hydraulic_sim.model import Model
@@ -23,7 +22,6 @@ from hydraulic_sysid.diagnosis.check import Finding, check, contradictions
 from hydraulic_sysid.diagnosis.check.experiment import resonance
 from hydraulic_sysid.report import render
 from hydraulic_sysid.verbs import calibrate as verb
-from hydraulic_sysid.verbs._diagnosis_table import show as show_diagnosis
 
 Array = np.ndarray
 Spoil = Callable[[Record], Record]
@@ -350,20 +348,6 @@ def test_a_contradiction_is_the_exit_code_and_stands_on_the_page(
     assert document["verdict"]["level"] == "off" and one["text"] in document["verdict"]["text"]
     assert one["remedy"] in (tmp_path / "run" / "report.html").read_text()
     assert_cannot_inject(json.loads((tmp_path / "run" / "check.json").read_text()))
-
-
-def test_a_diagnosis_begins_with_its_contradictions(capsys: pytest.CaptureFixture[str]) -> None:
-    finding = {
-        "kind": "travel",
-        "subject": "stroke",
-        "severity": "contradiction",
-        "text": "Too far.",
-        "remedy": "Mend.",
-    }
-    verdict = {"text": "Nothing is missing."}
-    document = {"model": {"name": "mine"}, "effects": [], "verdict": verdict, "check": [finding]}
-    show_diagnosis(document, Console(width=100))
-    assert capsys.readouterr().out.startswith("warning: Too far. Mend.")
 
 
 def test_the_page_shows_a_check_without_findings(model: Model, records: list[Record]) -> None:

@@ -10,6 +10,7 @@ import pytest
 from hostile_page import assert_cannot_inject
 
 from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.diagnosis.search import Diagnosis
 from hydraulic_sysid.report import render
 from hydraulic_sysid.verbs.add import main as add_main
 from hydraulic_sysid.verbs.diagnose import main as diagnose_main
@@ -120,6 +121,16 @@ def test_the_page_of_every_verdict_says_what_to_do(run: Path, kind: str, change:
         document["residual"]["after_each_effect"] = []
     page = render([{**document, **change}])
     assert [word for word in words.split("; ") if word not in page] == []
+
+
+def test_contradictions_are_warnings_on_top_of_the_answer(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = {**json.loads((run / "diagnose.json").read_text()), "check": [CONTRADICTION]}
+    found = Diagnosis(load_model("sample_bench"), {}, document)
+    monkeypatch.setattr("hydraulic_sysid.verbs.diagnose.diagnose", lambda *_: found)
+    assert diagnose_main(["--model", "sample_bench", "--record", str(RECORDS), "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.startswith("warning: The travel is too long. Mend the stroke.\n")
 
 
 def test_a_model_is_never_overwritten(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
