@@ -98,6 +98,7 @@ LONGEST = (
     "system/test_paper.py",
     "sysid/test_next_experiment.py",
     "hidden_effects/test_benches.py",
+    "hidden_effects/test_family.py",
     "sysid/test_locate.py",
     "hidden_effects/test_emps.py",
     "bringup/test_paper.py",
