@@ -91,6 +91,11 @@ class RecordingFault:
         return [self.hypothesis.applied(s, self.size) for s in segments]
 
     @property
+    def linear(self) -> bool:
+        """Whether it is a disturbance of the drive rather than another timing of a channel."""
+        return isinstance(self.hypothesis, DriveHypothesis)
+
+    @property
     def unit(self) -> str:
         """Of the size."""
         return self.hypothesis.unit

@@ -196,7 +196,9 @@ class Search:
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
                 break
-            near = [f for f in faults if f.reduction >= NEAR * faults[0].reduction][:FULL]
+            # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
+            near = [f for f in faults if not f.linear and f.reduction >= NEAR * faults[0].reduction][:FULL]
+            near = faults[:1] if faults[0].linear else near
             found = min((self.with_fault(base, f) for f in near), key=lambda f: f.misfit.total)
             if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
