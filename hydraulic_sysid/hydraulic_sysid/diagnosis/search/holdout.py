@@ -19,7 +19,7 @@ from hydraulic_sysid.estimation.segments import Segments, cut
 
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
-MOST_VALUES = 750_000  # measured values of all segments: two minutes of three channels at 2 kHz
+MOST_VALUES = 240_000  # measured values of all segments: eighty seconds of three channels at 1 kHz
 
 
 @dataclass(frozen=True)

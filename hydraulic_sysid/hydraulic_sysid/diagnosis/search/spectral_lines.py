@@ -72,12 +72,15 @@ class _Spectrum:
 
 
 def _spectrum(segments: Segments, residual: Array) -> _Spectrum | None:
-    run = segments.by_channel(residual)[:, :-1].reshape(-1, len(segments.channels))
-    if len(run) < 5 * _AROUND:
+    index = (segments.first[:, None] + np.arange(segments.samples - 1)).reshape(-1)
+    if len(index) < 5 * _AROUND:
         return None
-    drive = segments.record["drive"][segments.first[:, None] + np.arange(segments.samples - 1)].reshape(-1)
-    way = np.sign(drive)
-    way = way - way.mean()
+    # On the record's own time, zero where no segment is: a line keeps its phase over what was left out.
+    begin, end = int(index.min()), int(index.max()) + 1
+    run, way = np.zeros((end - begin, len(segments.channels))), np.zeros(end - begin)
+    run[index - begin] = segments.by_channel(residual)[:, :-1].reshape(-1, len(segments.channels))
+    sign = np.sign(segments.record["drive"][index])
+    way[index - begin] = sign - sign.mean()
     way /= max(float(np.sqrt(np.mean(way**2))), 1e-9)
     frequency: Array = np.fft.rfftfreq(_FINER * len(run), segments.record.dt).astype(np.float64)
     plain, turned = _power(run), _power(run * way[:, None])
