@@ -278,7 +278,10 @@ class Search:
         promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
         found = []
         for r in [r for r in self.explore(without, LATER_REFITS).refits if r.misfit.total < promising][:FULL]:
-            reached = self.state(r.refit.model, self._last).misfit
+            try:
+                reached = self.state(r.refit.model, self._last).misfit
+            except SimulationError:
+                continue
             if not significant(reached.total - done.misfit.total, reached.count, reached.variance):
                 found.append(r.name)
         return tuple(found)
