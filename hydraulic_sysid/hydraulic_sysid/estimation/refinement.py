@@ -94,15 +94,19 @@ def _rates(segments: Segments, raw: Array) -> Array:
 
 def _hum(segments: Segments, lines: Sequence[Sequence[float]], size: Sequence[float]) -> Array:
     """Sine and cosine (S, samples, C, K) of every line of a channel, as large as hum may be."""
-    time = (segments.first[:, None] + np.arange(segments.samples)) * segments.record.dt
-    found = [np.zeros((*segments.measured.shape, 0))]
+    found = []
     for c, (frequencies, std) in enumerate(zip(lines, size, strict=True)):
-        for f in frequencies:
-            for wave in (np.sin, np.cos):
-                column = np.zeros((*segments.measured.shape, 1))
-                column[:, :, c, 0] = HUM * std * wave(2.0 * np.pi * f * time)
-                found.append(column)
+        column = np.zeros((*segments.measured.shape, 2 * len(frequencies)))
+        column[:, :, c] = HUM * std * _waves(segments, frequencies)
+        found.append(column)
     return np.concatenate(found, axis=-1)
+
+
+def _waves(segments: Segments, lines: Sequence[float]) -> Array:
+    """Sine and cosine (S, samples, 2·L) of every line, on the record's time."""
+    time = (segments.first[:, None] + np.arange(segments.samples)) * segments.record.dt
+    angle = 2.0 * np.pi * time[..., None] * np.array(lines)
+    return np.concatenate((np.sin(angle), np.cos(angle)), axis=-1)
 
 
 def _filter_states(segments: Segments, timing: Sequence[Timing]) -> Array:
@@ -122,9 +126,7 @@ def _without(residual: Array, lines: Sequence[float], segments: Segments) -> Arr
     """Residuals (S, samples) of one channel without their lines, segment by segment."""
     if not lines:
         return residual
-    time = (segments.first[:, None] + np.arange(segments.samples)) * segments.record.dt
-    waves = np.stack([w(2.0 * np.pi * f * time) for f in lines for w in (np.sin, np.cos)], axis=-1)
-    basis, _ = np.linalg.qr(waves)
+    basis, _ = np.linalg.qr(_waves(segments, lines))
     return residual - (basis @ (np.swapaxes(basis, -1, -2) @ residual[..., None]))[..., 0]
 
 

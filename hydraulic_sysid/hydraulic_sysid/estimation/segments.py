@@ -165,6 +165,12 @@ class Segments:
         return replace(self, noise=tuple(noise), prior_std=prior, nuisance=self.nuisance[..., :0])
 
 
+def spread(segments: Sequence[Segments], most: int) -> list[Segments]:
+    """About ``most`` of the segments, spread over all records."""
+    every = max(1, round(sum(map(len, segments)) / most))
+    return [s.subset(np.arange(len(s)) % every == 0) for s in segments]
+
+
 def cut(records: Sequence[Record], kind: str, length: float, robust: bool = False) -> list[Segments]:
     """Cut records into equal segments of about ``length`` seconds; one as long as the record is a free run.
 

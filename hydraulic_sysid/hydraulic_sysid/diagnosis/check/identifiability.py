@@ -21,7 +21,7 @@ from hydraulic_sysid.estimation.errors import CalibrationError, SegmentError
 from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.parameters import bounded
 from hydraulic_sysid.estimation.refinement import LAW
-from hydraulic_sysid.estimation.segments import Segments, cut
+from hydraulic_sysid.estimation.segments import cut, spread
 from hydraulic_sysid.estimation.uncertainty import VAGUE, attainable
 
 from .finding import NOT_IDENTIFIABLE, NOTE, Finding
@@ -50,7 +50,7 @@ def not_identifiable(
         return []
     try:
         segments = cut(records, model.kind, length)
-        point = FitPoint.begin(Plant(model), spread(segments), keys)
+        point = FitPoint.begin(Plant(model), spread(segments, _MOST), keys)
         share = sum(map(len, point.shooting.segments)) / sum(map(len, segments))
         known = attainable(with_laws_off(point), point.columns, share)
         same = attainable(point, point.columns, share).correlation
@@ -61,12 +61,6 @@ def not_identifiable(
     return [_alone(model, key, known.standard_errors[key]) for key in vague] + _pairs(
         keys, vague, known.correlation, same
     )
-
-
-def spread(segments: Sequence[Segments]) -> list[Segments]:
-    """About `_MOST` of them, spread over all records."""
-    every = max(1, round(sum(len(s) for s in segments) / _MOST))
-    return [s.subset(np.arange(len(s)) % every == 0) for s in segments]
 
 
 def with_laws_off(point: FitPoint) -> FitPoint:

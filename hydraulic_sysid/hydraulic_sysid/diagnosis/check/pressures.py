@@ -11,6 +11,7 @@ the position or the friction enters; both directions together give R as well.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -35,12 +36,8 @@ _WIDE = 0.5  # of the largest openings of all steady motion: at smaller ones lea
 def beyond_supply(seen: Observed) -> list[Finding]:
     """A chamber above supply: impossible while it is filled from there, else a shock or a load."""
     supply, found = seen.plant.value("supply_pressure"), []
-    for name, filling in (("pressure_a", 1), ("pressure_b", -1)):
-        if name not in seen.signals:
-            continue
-        margin = _margin(seen, name)
+    for name, margin, filled in _chambers(seen, filled=True):
         often = float(np.mean(seen.signals[name] - seen.signals.get("pressure_supply", supply) > margin))
-        filled = seen.windows.flowing.going(filling)
         source = np.where(np.isfinite(filled.pressure_supply), filled.pressure_supply, supply)
         against = getattr(filled, name) > source + margin
         severity = CONTRADICTION if against.sum() >= FEWEST else DOUBTFUL
@@ -56,12 +53,9 @@ def beyond_supply(seen: Observed) -> list[Finding]:
 def below_tank(seen: Observed) -> list[Finding]:
     """A chamber below the tank: impossible while it is emptied there, else cavitation of a moment."""
     tank, found = seen.plant.value("tank_pressure"), []
-    for name, emptying in (("pressure_a", -1), ("pressure_b", 1)):
-        if name not in seen.signals:
-            continue
-        margin = _margin(seen, name)
+    for name, margin, emptied in _chambers(seen, filled=False):
         often = float(np.mean(seen.signals[name] < tank - margin))
-        against = getattr(seen.windows.flowing.going(emptying), name) < tank - margin
+        against = getattr(emptied, name) < tank - margin
         severity = CONTRADICTION if against.sum() >= FEWEST else DOUBTFUL
         if often > _OFTEN:
             least = float(np.quantile(seen.signals[name], 0.5 * _OFTEN))
@@ -160,6 +154,13 @@ def _other_supply(plant: Plant, measured: float, how: str, records: tuple[str, .
     text = f"The supply pressure is {quantity(measured, 'Pa')} {how}; the model has {quantity(stated, 'Pa')}."
     remedy = "Correct supply_pressure, or let it be measured; an accumulator or a weak pump makes it droop."
     return [Finding("supply", "supply_pressure", severity, text, remedy, measured, stated, "Pa", records)]
+
+
+def _chambers(seen: Observed, filled: bool) -> Iterator[tuple[str, float, Windows]]:
+    """Measured pressures, their margins [Pa] and steady motion in which that chamber is ``filled``, else emptied."""
+    for name, extending in (("pressure_a", 1), ("pressure_b", -1)):
+        if name in seen.signals:
+            yield name, _margin(seen, name), seen.windows.flowing.going(extending if filled else -extending)
 
 
 def _margin(seen: Observed, name: str) -> float:

@@ -15,11 +15,9 @@ from .candidates import subsystem
 from .holdout import BLOCK, EVERY
 from .misfit import Misfit
 from .nonparametric_curves import NonparametricCurve
-from .remainder import remainders, spikes
 from .search import SearchResult
 from .uncertainty import Known
 from .verdict import MISSING, OUTSIDE, UNSEEN, Verdict
-from .whiteness import whiteness
 from .worst_segments import worst_segments
 
 _NEAREST = 3
@@ -122,17 +120,17 @@ def document(
                     "share": s.share,
                     "places": [{"record": record, "time": time} for record, time in s.places[:MOST_PLACES]],
                 }
-                for s in spikes(result.split)
+                for s in result.spikes
             ],
             "mains_lines": {
                 c: sorted({f for s in result.split.segments if c in s.channels for f in s.hum[s.channels.index(c)]})
                 for c in result.split.channels
             },
         },
-        "whiteness": [vars(w) | {"coloured": w.coloured} for w in whiteness(result.split, final.residual)],
+        "whiteness": [vars(w) | {"coloured": w.coloured} for w in result.whiteness],
         "remainder": [
             {"channel": r.channel, "beyond_noise": r.beyond, "noise": r.noise, "motion": r.motion, "share": r.share}
-            for r in remainders(result.split, final.residual)
+            for r in result.remainders
         ],
         "parameters": _parameters(final.model, known, final.linearisation.parameters.keys),
         "unexplained_share": verdicts.unexplained_share(result),

@@ -15,6 +15,7 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation.noise import robust_noise_std
+from hydraulic_sysid.estimation.projection import Projection
 from hydraulic_sysid.estimation.segments import Segments
 
 from .linearisation import Linearisation
@@ -44,8 +45,8 @@ class DriveHypothesis:
     disturbances: Callable[[Array, Array], Disturbed]
     channels: tuple[str, ...] = ("drive",)
 
-    def applied(self, at: Linearisation, size: float = 1.0) -> list[Segments]:
-        """The linearisation's segments, their drive taken to have it, of a ``size`` over that of the hypothesis."""
+    def responses(self, at: Linearisation) -> list[Array]:
+        """What the disturbances do to the channels: (S, samples, C, D) per record [SI]."""
         point, found = at.point, []
         for i, (segments, states) in enumerate(zip(point.shooting.segments, point.initial_states, strict=True)):
             drive = segments.record["drive"]
@@ -55,19 +56,30 @@ class DriveHypothesis:
                 return segments.recorded(point.shooting.driven(point.plant, i, states, values))
 
             base = seen(drive)
-            columns = [size * (seen(moved) - base) for moved in self.disturbances(drive, inside)]
-            disturbance = np.stack(columns, axis=-1)
-            nuisance = np.concatenate((segments.nuisance, segments.whitened(disturbance)), axis=-1)
-            found.append(replace(segments, disturbance=disturbance, nuisance=nuisance))
+            found.append(np.stack([seen(moved) - base for moved in self.disturbances(drive, inside)], axis=-1))
         return found
+
+
+def disturbed(segments: Sequence[Segments], responses: Sequence[Array]) -> list[Segments]:
+    """Segments in which such disturbances may be (S, samples, C, D)."""
+    found = []
+    for s, response in zip(segments, responses, strict=True):
+        nuisance = np.concatenate((s.nuisance, s.whitened(response)), axis=-1)
+        found.append(replace(s, disturbance=response, nuisance=nuisance))
+    return found
+
+
+def freedom(now: Sequence[Projection], before: Sequence[Projection]) -> list[Array]:
+    """What the freedom that disturbances give is worth, as a cost (S,) per record."""
+    return [n.log_determinant - b.log_determinant for n, b in zip(now, before, strict=True)]
 
 
 def costs_with(at: Linearisation, before: Linearisation) -> list[Array]:
     """Costs (S,) per record, with what the freedom of disturbances that ``before`` did not have is worth."""
-    every = zip(at.costs, at.point.projections, before.point.projections, strict=True)
     if all(s.disturbance.shape[-1] == 0 for s in at.split.segments):
         return at.costs
-    return [cost + new.log_determinant - old.log_determinant for cost, new, old in every]
+    worth = freedom(at.point.projections, before.point.projections)
+    return [cost + own for cost, own in zip(at.costs, worth, strict=True)]
 
 
 def _bends(drive: Array, inside: Array) -> Disturbed:

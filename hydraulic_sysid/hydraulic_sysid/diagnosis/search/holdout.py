@@ -15,7 +15,7 @@ import numpy as np
 
 from hydraulic_sim.arrays import Index, Mask
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.estimation.segments import Segments, cut
+from hydraulic_sysid.estimation.segments import Segments, cut, spread
 
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
@@ -36,8 +36,7 @@ class Split:
 
     def some(self, most: int) -> list[Segments]:
         """About ``most`` of those that a fit sees, spread over all records."""
-        every = max(1, round(sum(int(f.sum()) for f in self.fit) / most))
-        return [s.subset(np.arange(len(s)) % every == 0) for s in self.to_fit]
+        return spread(self.to_fit, most)
 
     def records(self, validation: bool = False) -> list[Record]:
         """Those of which at least a part is fitted, or those that are named for ``validation``."""

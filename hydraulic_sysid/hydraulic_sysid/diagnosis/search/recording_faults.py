@@ -17,7 +17,7 @@ from hydraulic_sysid.estimation.levenberg_marquardt import bounded_step
 from hydraulic_sysid.estimation.recording import Timing
 from hydraulic_sysid.estimation.segments import Segments
 
-from .drive_faults import DRIVE_HYPOTHESES, DriveHypothesis
+from .drive_faults import DRIVE_HYPOTHESES, DriveHypothesis, disturbed, freedom
 from .linearisation import Linearisation
 
 ENOUGH = 50  # segments that do for a look
@@ -81,7 +81,7 @@ class RecordingFault:
     def applied(self, at: Linearisation) -> list[Segments]:
         """The linearisation's segments, their records taken to have it."""
         if isinstance(self.hypothesis, DriveHypothesis):
-            return self.hypothesis.applied(at)
+            return disturbed(at.point.shooting.segments, self.hypothesis.responses(at))
         return self.on(at.point.shooting.segments)
 
     def on(self, segments: Sequence[Segments]) -> list[Segments]:
@@ -123,8 +123,9 @@ def recording_faults(at: Linearisation) -> list[RecordingFault]:
         found += [fault] if fault is not None else []
     if not any(s.disturbance.shape[-1] for s in point.shooting.segments):
         for one in DRIVE_HYPOTHESES:
-            lower = before - _cost_disturbed(part, one, 1.0)
-            if one.exact and lower < before - _cost_disturbed(part, one, 0.5):
+            responses = one.responses(part)
+            lower = before - _cost_disturbed(part, responses)
+            if one.exact and lower < before - _cost_disturbed(part, [0.5 * r for r in responses]):
                 continue  # disturbances of that size would show more than there is
             size = float(np.median([one.size(s) for s in at.split.segments]))
             found += [RecordingFault(one, size, 0.0, lower / share)] if lower > 0.0 else []
@@ -143,16 +144,13 @@ def resized(at: Linearisation, fault: RecordingFault) -> RecordingFault:
     return _best(part, runs, fault.hypothesis, np.inf, share, fault.size) or fault
 
 
-def _cost_disturbed(part: Linearisation, hypothesis: DriveHypothesis, size: float) -> float:
-    """As `_cost`, for disturbances of this ``size`` over theirs, with what their freedom is worth."""
-    shooting = replace(part.point.shooting, segments=hypothesis.applied(part, size))
+def _cost_disturbed(part: Linearisation, responses: Sequence[Array]) -> float:
+    """As `_cost`, with disturbances that do this to the channels, and with what their freedom is worth."""
+    shooting = replace(part.point.shooting, segments=disturbed(part.point.shooting.segments, responses))
     projections = shooting.projections(part.point.plant, part.point.initial_states)
     point = replace(part.point, shooting=shooting, projections=projections)
     beyond = [p.beyond(b) for p, b in zip(projections, part.beyond, strict=True)]
-    worth = sum(
-        float(np.sum(new.log_determinant - old.log_determinant))
-        for new, old in zip(projections, part.point.projections, strict=True)
-    )
+    worth = sum(float(f.sum()) for f in freedom(projections, part.point.projections))
     return _cost(replace(part, point=point, beyond=beyond), [p.raw for p in projections]) + worth
 
 

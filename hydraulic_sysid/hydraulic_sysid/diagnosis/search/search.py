@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
@@ -30,9 +30,10 @@ from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import Misfit, explained, material, misfit
 from .recording_faults import RecordingFault, recording_faults, resized
-from .remainder import negligible, remainders
+from .remainder import Remainder, Spikes, negligible, remainders, spikes
 from .score_test import CandidateScore, score
 from .spectral_lines import record_features
+from .whiteness import Whiteness, whiteness
 
 PROMISING = 0.04  # of the best predicted reduction, from which a candidate is refitted
 MOST_REFITS = 8
@@ -134,6 +135,21 @@ class SearchResult:
     def added(self) -> list[str]:
         """Effects, the one that explains most first."""
         return list(self.misfits)
+
+    @cached_property
+    def remainders(self) -> list[Remainder]:
+        """What is left in the end, in the units of the sensors."""
+        return remainders(self.split, self.final.residual)
+
+    @cached_property
+    def whiteness(self) -> list[Whiteness]:
+        """Of what is left in the end."""
+        return whiteness(self.split, self.final.residual)
+
+    @cached_property
+    def spikes(self) -> list[Spikes]:
+        """Samples that do not count."""
+        return spikes(self.split)
 
 
 class Search:

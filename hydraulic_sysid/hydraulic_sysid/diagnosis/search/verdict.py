@@ -14,9 +14,9 @@ from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
 from .drive_faults import DriveHypothesis
 from .nonparametric_curves import NonparametricCurve
-from .remainder import Remainder, negligible, remainders, spikes
+from .remainder import Remainder, negligible
 from .search import SearchResult
-from .whiteness import Whiteness, whiteness
+from .whiteness import Whiteness
 
 MISSING = "missing"
 INDISTINGUISHABLE = "indistinguishable"
@@ -117,7 +117,7 @@ def kind_of(result: SearchResult, tied: bool) -> str:
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added."""
     final = result.final.misfit
     typical = min(final.variance, final.typical)
-    little = typical <= LARGE**2 or (typical <= SMALL and negligible(remainders(result.split, result.final.residual)))
+    little = typical <= LARGE**2 or (typical <= SMALL and negligible(result.remainders))
     if not result.added:
         if not little and unexplained_share(result) > UNEXPLAINED:
             return RECORDING if drive_unknown(result) else OUTSIDE
@@ -132,7 +132,7 @@ def kind_of(result: SearchResult, tied: bool) -> str:
 
 def faulty(result: SearchResult) -> bool:
     """Whether the recording, not the physics, is at fault."""
-    return bool(result.faults) or any(s.share > MANY_SPIKES for s in spikes(result.split))
+    return bool(result.faults) or any(s.share > MANY_SPIKES for s in result.spikes)
 
 
 def drive_unknown(result: SearchResult) -> bool:
@@ -159,7 +159,7 @@ def place(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparametric
 def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
     """What a user reads first."""
     base, final = result.base.misfit.rms_validation, result.final.misfit.rms_validation
-    left = " ".join([remainder_sentence(remainders(result.split, result.final.residual)), *noise_sentences(result)])
+    left = " ".join([remainder_sentence(result.remainders), *noise_sentences(result)])
     fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
     if verdict.kind == COMPLETE:
         return (
@@ -205,7 +205,7 @@ def remainder_sentence(found: Sequence[Remainder]) -> str:
 
 def noise_sentences(result: SearchResult) -> list[str]:
     """Where the residual is not the noise that it is taken for."""
-    found = whiteness(result.split, result.final.residual)
+    found = result.whiteness
     return [s for w in found for s in (_coloured(w), _below(w)) if s]
 
 
@@ -238,7 +238,7 @@ def data_sheet_sentences(result: SearchResult) -> list[str]:
 def recording_sentences(result: SearchResult) -> list[str]:
     """What is wrong in the records, and what to mend in the logger."""
     found = [f"{fault.text}: {fault.hypothesis.remedy}." for fault in result.faults]
-    for s in spikes(result.split):
+    for s in result.spikes:
         name, time = s.places[0]
         found.append(
             f"{s.count} samples of {TITLES[s.channel]} ({100.0 * s.share:.2g} %) are spikes, the first at {time:.4g} s "
