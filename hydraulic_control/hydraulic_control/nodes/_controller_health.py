@@ -6,6 +6,7 @@ from collections import deque
 
 from diagnostic_msgs.msg import DiagnosticArray
 
+from hydraulic_control.lockstep import ReferenceLockstep
 from hydraulic_control.session import ControlSession
 from hydraulic_interfaces.contract import CONTROLLER_NODE, absolute
 from hydraulic_node_utils.nodes import diagnostics
@@ -21,6 +22,7 @@ class ControllerHealth:
         self._answered = 0
         self._then_ns = 0
         self.scheduling = "normal"
+        self.lockstep: ReferenceLockstep | None = None
         self.latencies: deque[float] = deque(maxlen=2000)
 
     def message(self, state: str, now_ns: int) -> DiagnosticArray:
@@ -47,6 +49,8 @@ class ControllerHealth:
         if late:
             values["latency_p50_ms"] = f"{late[len(late) // 2] * 1e3:.4f}"
             values["latency_p99_ms"] = f"{late[int(0.99 * (len(late) - 1))] * 1e3:.4f}"
+        if self.lockstep:
+            values["without_reference"] = self.lockstep.given_up
         level, text = OK, f"{state}, {rate:.0f} Hz"
         if more:
             level, text = WARN, session.trouble

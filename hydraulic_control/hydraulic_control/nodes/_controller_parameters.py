@@ -23,6 +23,7 @@ SAFETY: tuple[ParameterSpec, ...] = (
 )
 PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("autostart", False, "configure and activate at start"),
+    ParameterSpec("lockstep", False, "a state waits for the reference of its instant; for a plant in lockstep"),
     ParameterSpec("realtime_priority", 15, "FIFO priority while active where permitted, 0: none", "", 0, 98),
     ParameterSpec("gains", "", f"parameter file of the gains, or one of {', '.join(gains_file.shipped())}; ''"),
     *SAFETY,

@@ -2,7 +2,8 @@
 
 It follows the topic `reference`; until one comes it holds the position that it found when it was activated. A command
 carries the stamp of the state it answers. The gains are live parameters; changing one makes no bump in the drive. A
-state that is too old or cannot be believed is answered with 0 V and a diagnostic.
+state that is too old or cannot be believed is answered with 0 V and a diagnostic. In lockstep a state waits for the
+reference of its instant.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from sensor_msgs.msg import JointState
 
 from hydraulic_control.controller import Controller
+from hydraulic_control.lockstep import ReferenceLockstep
 from hydraulic_control.nodes._controller_health import ControllerHealth
 from hydraulic_control.nodes._controller_parameters import PARAMETERS, ControllerParameters
 from hydraulic_control.session import ControlSession
 from hydraulic_interfaces.contract import CONTROLLER_NODE, NAMESPACE
 from hydraulic_interfaces.conversions import CommandEncoder, reference_from_message, sample_from_messages
 from hydraulic_interfaces.qos import profile
+from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.nodes.callbacks import understood
 from hydraulic_node_utils.nodes.guarded_lifecycle import guard_transitions
 from hydraulic_node_utils.nodes.serving import Served, serve
@@ -47,6 +50,8 @@ class ControllerNode(Served, LifecycleNode):
         self._simulated = self.get_parameter("use_sim_time").value
         self._heard, self._reported = self._steady(), time.monotonic()
         self._stamp_ns = 0
+        self._lockstep = self._health.lockstep = ReferenceLockstep() if self._settings.table["lockstep"] else None
+        self._waiting: PlantSample | None = None
         self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
         self.create_subscription(JointState, "reference", self._on_reference, profile("reference", STATE_DEPTH))
         if self._settings.table["autostart"]:
@@ -70,7 +75,7 @@ class ControllerNode(Served, LifecycleNode):
         self._session.begin()
         if priority := self._settings.table["realtime_priority"]:
             self._health.scheduling = request_realtime_for_all(priority)
-        self._heard, self._state = self._steady(), "active"
+        self._heard, self._state, self._waiting = self._steady(), "active", None
         return SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -96,6 +101,7 @@ class ControllerNode(Served, LifecycleNode):
     def watch(self) -> None:
         """What must happen without a message: notice silence, report health."""
         now = time.monotonic()
+        self._answer()
         if self._state == "active" and self._session.silence(age := self._steady() - self._heard):
             self._command.publish(self._encode(self._stamp_ns + round(age * 1e9), 0.0))
             self._reported = 0.0
@@ -114,6 +120,19 @@ class ControllerNode(Served, LifecycleNode):
         sample = understood(self, "state", sample_from_messages, message)
         if sample is None:
             return
+        self._waiting = sample
+        if self._lockstep:
+            self._lockstep.state(sample.stamp_ns, time.monotonic())
+        self._answer()
+
+    def _answer(self) -> None:
+        """Answer the state that waits, unless its reference is still to come."""
+        sample = self._waiting
+        if sample is None or self._state != "active":
+            return
+        if self._lockstep and self._lockstep.waits(self.count_publishers("reference"), time.monotonic()):
+            return
+        self._waiting = None
         clock = self.get_clock()
         drive = self._session.answer(sample, clock.now().nanoseconds)
         if drive is not None:
@@ -126,6 +145,9 @@ class ControllerNode(Served, LifecycleNode):
         reference = understood(self, "reference", reference_from_message, message)
         if reference is not None:
             self._session.follow(reference)
+            if self._lockstep:
+                self._lockstep.reference(reference.stamp_ns)
+                self._answer()
 
     def _steady(self) -> float:
         """Seconds by which silence is measured: a simulation may run slower than the wall's clock."""
