@@ -26,8 +26,8 @@ from hydraulic_control import gains_file
 from hydraulic_control.controller import Controller
 from hydraulic_control.evaluation import over_scatter
 from hydraulic_control.parameters import CONTROLLERS
+from hydraulic_control.refusals import Refusal
 from hydraulic_control.response import Response, step_figures
-from hydraulic_control.session import Refusal
 from hydraulic_control.simulation import SensorNoise
 from hydraulic_control.tuning import Criteria
 

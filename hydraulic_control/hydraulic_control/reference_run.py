@@ -16,6 +16,27 @@ from hydraulic_interfaces.samples import PlantSample, Reference
 _LONGEST = 4_000_000  # samples kept
 
 
+class StandstillWatch:
+    """Notices a plant that does not follow: at 0 V for ``patience`` [s], further than ``error`` [m] from its reference.
+
+    No controller leaves the drive at exactly 0 V there; a plant that is stopped or not enabled does.
+    """
+
+    def __init__(self, error: float = 5e-3, patience: float = 0.1) -> None:
+        self.error, self.patience = error, patience
+        self._since_ns: int | None = None
+
+    def stands(self, sample: PlantSample, reference: float | None) -> bool:
+        """Whether it has stood for that long at this state; ``reference`` [m] is what was sent last, None: nothing."""
+        away = reference is not None and abs(reference - sample.position) > self.error
+        if not away or sample.drive != 0.0:
+            self._since_ns = None
+            return False
+        if self._since_ns is None:
+            self._since_ns = sample.stamp_ns
+        return (sample.stamp_ns - self._since_ns) * 1e-9 >= self.patience
+
+
 class ReferenceRun:
     """Answers every state with a reference until the trajectory has been played, and keeps the response.
 

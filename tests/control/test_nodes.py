@@ -56,12 +56,12 @@ def set_parameter(client: Any, name: str, value: float | str, target: str = CONT
     return client.call("rcl_interfaces/srv/SetParameters", f"{target}/set_parameters", parameters=[change]).results[0]
 
 
-def refer(client: Any, publisher: Any, position: float) -> None:
+def refer(client: Any, publisher: Any, position: float, stamp_ns: int | None = None) -> None:
     from hydraulic_interfaces.conversions import reference_to_message
     from hydraulic_interfaces.samples import Reference
 
-    now = client.node.get_clock().now().nanoseconds
-    publisher.publish(reference_to_message(Reference(now, position, 0.0)))
+    stamp = client.node.get_clock().now().nanoseconds if stamp_ns is None else stamp_ns
+    publisher.publish(reference_to_message(Reference(stamp, position, 0.0)))
 
 
 def controller_says(heard: list[Any]) -> dict[str, str]:
@@ -103,6 +103,19 @@ def test_a_step_through_the_topics_is_that_in_one_process(
     assert through_topics.steady_state_error == pytest.approx(in_process.steady_state_error, abs=1e-5)
     assert np.abs(response.drive).max() <= 10.0
     assert np.diff(response.time) == pytest.approx(1e-3), "one reference for every state"
+
+    states, reference = client.collect("state"), client.publisher("reference")
+    wait_until(lambda: states and reference.get_subscription_count(), "states, and a controller that listens")
+    assert client.call("std_srvs/srv/Trigger", "/actuator/emergency_stop").success
+    wait_until(lambda: plant_now(heard) - 10**8 > from_time(states[0].header.stamp), "a while at 0 V")
+    for stamp in (0, plant_now(heard) - 5 * 10**9):
+        refer(client, reference, 0.3, stamp)
+    wait_until(lambda: int(controller_says(heard).get("old_reference", 0)) == 2, "that both are refused")
+    assert client.call("std_srvs/srv/Trigger", "/actuator/reset").success
+    assert client.call("std_srvs/srv/SetBool", "/actuator/enable", data=True).success
+    begun, found = len(states), states[-1].position[0]
+    wait_until(lambda: len(states) > begun + 500, "half a second enabled")
+    assert max(abs(m.position[0] - found) for m in states[begun:]) < 1e-4, "nothing moves"
 
 
 def test_lifecycle_live_gains_and_stale_states(plant: Any, node: Any, client: Any, wait_until: Any) -> None:
@@ -165,6 +178,8 @@ def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(
     sine = ("kind:=sine", "amplitude:=0.03", "frequency:=1.0", "cycles:=3")
     player = node("reference", "autostart:=true", "exit_when_done:=true", f"output:={output}", *PLAYS, *sine)
     wait_until(lambda: controller_says(heard).get("reference_m") != "none", "a reference")
+    refused = set_parameter(client, "output", str(tmp_path / "thesis.txt"), "/actuator/reference")
+    assert not refused.successful and "output" in refused.reason
     begun = answered()
     wait_until(lambda: answered() > begun + 2500, "some of the sine")
     assert set_parameter(client, "extra_effects", effects, "/actuator/plant").successful
@@ -206,11 +221,14 @@ def test_the_relay_needs_an_obedient_plant_and_keeps_its_travel(plant: Any, node
     assert "travelled" in far.output()
 
 
-def test_bad_parameters_are_told_at_the_start(node: Any) -> None:
+def test_bad_parameters_are_told_at_the_start(node: Any, tmp_path: Path) -> None:
+    thesis = tmp_path / "thesis.txt"
+    thesis.write_text("ten years of work")
     for name, parameter, complaint in (
         ("reference", "amplitude:=0.9", "allowed are 0.6 m"),
         ("controller", "controller:=lqr", "pole_placement"),
         ("relay", "amplitude:=50.0", "amplitude"),
+        ("reference", f"output:={thesis}", "thesis.txt exists"),
     ):
         process = node(name, parameter, *(["autostart:=true"] if name == "reference" else []))
         assert process.wait() == 2, process.output()

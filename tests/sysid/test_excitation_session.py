@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.plant_report import COMMAND_ROW, PLANT_ROW
 from hydraulic_sysid.excitation import Phase, Plan, Session
-from hydraulic_sysid.excitation.plant_report import COMMAND_ROW, PLANT_ROW
 from hydraulic_sysid.excitation.signals.steps import Steps
 
 START_NS = 1_700_000_000_000_000_000

@@ -16,10 +16,11 @@ from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 SAFETY: tuple[ParameterSpec, ...] = (
     ParameterSpec("age_limit", 0.02, "age of a state, or silence, that gives 0 V", "s", 1e-3, 1.0, live=True),
+    ParameterSpec("reference_age_limit", 0.5, "age from which a reference that comes is refused", "s", 0.01, 2.0),
     ParameterSpec("reference_timeout", 0.1, "age of a reference from which it stands", "s", 1e-3, 1e3, live=True),
     ParameterSpec("travel", 0.7, "largest reference to either side", "m", 0.0, 100.0, live=True),
     ParameterSpec("speed_limit", 20.0, "a position that leaps faster is not believed", "m/s", 0.1, 1e6, live=True),
-    ParameterSpec("applied_tolerance", 0.5, "between applied drive and commands; 0: any", "V", 0.0, 20.0, live=True),
+    ParameterSpec("applied_tolerance", 0.05, "between the applied drive and the commands", "V", 1e-3, 1.0),
 )
 PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("autostart", False, "configure and activate at start"),
@@ -29,6 +30,9 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     *SAFETY,
     *LAW,
 )
+
+
+_OF_REFERENCES = {"reference_age_limit": "age_limit", "reference_timeout": "timeout", "travel": "travel"}
 
 
 class ControllerParameters:
@@ -63,5 +67,7 @@ class ControllerParameters:
     def _apply(self, name: str, value: Any) -> None:
         if name in SPECS:
             self._session.controller.set({name: value})
+        elif name in _OF_REFERENCES:
+            setattr(self._session.references, _OF_REFERENCES[name], value)
         else:
             setattr(self._session, name, value)

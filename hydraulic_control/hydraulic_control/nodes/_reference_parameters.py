@@ -17,6 +17,6 @@ PARAMETERS = (
     ParameterSpec("acceleration_limit", 10.0, "largest acceleration", "m/s^2", 1e-3, 1e4, live=True),
     ParameterSpec("autostart", False, "start with the first state while a controller listens"),
     ParameterSpec("exit_when_done", False, "leave after the run: exit code 0 played, 1 broken off", live=True),
-    ParameterSpec("output", "", "JSON file for the response; empty: none is kept", live=True),
+    ParameterSpec("output", "", "new JSON file for the response; empty: none is kept"),
     ParameterSpec("state_timeout", 0.5, "silence of the state that breaks a run off", "s", 0.01, 10.0, live=True),
 )

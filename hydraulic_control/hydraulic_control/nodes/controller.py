@@ -2,8 +2,8 @@
 
 It follows the topic `reference`; until one comes it holds the position that it found when it was activated. A command
 carries the stamp of the state it answers. The gains are live parameters; changing one makes no bump in the drive. A
-state that is too old or cannot be believed is answered with 0 V and a diagnostic. In lockstep a state waits for the
-reference of its instant.
+state that is too old or cannot be believed is answered with 0 V and a diagnostic. Whenever the plant does not obey, the
+reference is dropped and the position found is held. In lockstep a state waits for the reference of its instant.
 """
 
 from __future__ import annotations
@@ -21,12 +21,14 @@ from hydraulic_control.nodes._controller_health import ControllerHealth
 from hydraulic_control.nodes._controller_parameters import PARAMETERS, ControllerParameters
 from hydraulic_control.session import ControlSession
 from hydraulic_interfaces.contract import CONTROLLER_NODE, NAMESPACE
-from hydraulic_interfaces.conversions import CommandEncoder, reference_from_message, sample_from_messages
+from hydraulic_interfaces.conversions import CommandEncoder, from_time, reference_from_message, sample_from_messages
 from hydraulic_interfaces.qos import profile
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.nodes.callbacks import understood
+from hydraulic_node_utils.nodes.diagnostics import OK
 from hydraulic_node_utils.nodes.guarded_lifecycle import guard_transitions
 from hydraulic_node_utils.nodes.serving import Served, serve
+from hydraulic_node_utils.plant_report import COMMAND_ROW, PLANT_ROW, PlantReport
 from hydraulic_plant_node.pacing import release_realtime_for_all, request_realtime_for_all
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -52,6 +54,8 @@ class ControllerNode(Served, LifecycleNode):
         self._stamp_ns = 0
         self._lockstep = self._health.lockstep = ReferenceLockstep() if self._settings.table["lockstep"] else None
         self._waiting: PlantSample | None = None
+        self._plant = PlantReport()
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, profile("diagnostics"))
         self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
         self.create_subscription(JointState, "reference", self._on_reference, profile("reference", STATE_DEPTH))
         if self._settings.table["autostart"]:
@@ -144,10 +148,16 @@ class ControllerNode(Served, LifecycleNode):
     def _on_reference(self, message: JointState) -> None:
         reference = understood(self, "reference", reference_from_message, message)
         if reference is not None:
-            self._session.follow(reference)
+            self._session.follow(reference, self.get_clock().now().nanoseconds)
             if self._lockstep:
                 self._lockstep.reference(reference.stamp_ns)
                 self._answer()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for row in message.status:
+            self._plant.update(row.name, row.level == OK, row.message, {pair.key: pair.value for pair in row.values})
+            if row.name in (PLANT_ROW, COMMAND_ROW) and (reason := self._plant.disobedience(CONTROLLER_NODE)):
+                self._session.disobeyed(reason, from_time(message.header.stamp))
 
     def _steady(self) -> float:
         """Seconds by which silence is measured: a simulation may run slower than the wall's clock."""

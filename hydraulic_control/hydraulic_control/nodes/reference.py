@@ -1,15 +1,14 @@
 """Node `/actuator/reference`: plays a trajectory for the controller, one reference for every state of the plant.
 
-It leads from where the piston is smoothly to where the trajectory begins, plays it, and holds its end. `~/start` and
-`~/stop` are the switches; the response (time, reference, position, drive) can be kept in a file, which
+It leads from where the piston is smoothly to where the trajectory begins, plays it, and holds its end; where the plant
+stands still meanwhile (stopped, not enabled), it sends nothing more. `~/start` and `~/stop` are the switches; a second
+`~/stop` ends the holding. The response (time, reference, position, drive) can be kept in a file, which
 `evaluate --bench` reads.
 """
 
 from __future__ import annotations
 
-import json
 import time
-from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,11 +16,12 @@ from sensor_msgs.msg import JointState
 
 from hydraulic_control.errors import ControlError
 from hydraulic_control.nodes._reference_parameters import PARAMETERS
-from hydraulic_control.reference_run import ReferenceRun
+from hydraulic_control.reference_run import ReferenceRun, StandstillWatch
 from hydraulic_control.trajectories import MotionLimits
 from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE, absolute
 from hydraulic_interfaces.conversions import ReferenceEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.json_file import NewJson
 from hydraulic_node_utils.nodes import diagnostics
 from hydraulic_node_utils.nodes.callbacks import trigger, understood
 from hydraulic_node_utils.nodes.parameters import ParameterTable
@@ -36,13 +36,15 @@ class ReferenceNode(ServedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(REFERENCE_NODE, namespace=NAMESPACE, **options)
-        self._table = ParameterTable(self, PARAMETERS)
+        self._table = ParameterTable(self, PARAMETERS, locked=lambda: True)
+        self._output = NewJson(self._table["output"], ControlError)
         self._encode = ReferenceEncoder()
         self._reference = self.create_publisher(JointState, "reference", profile("reference"))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
         self._armed: ReferenceRun | None = self._make() if self._table["autostart"] else None
         self._run: ReferenceRun | None = None
         self._held: float | None = None
+        self._watch = StandstillWatch()
         self._end, self._failed = "idle", False
         self._heard = self._reported = time.monotonic()
         self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
@@ -76,6 +78,11 @@ class ReferenceNode(ServedNode):
         self._heard = time.monotonic()
         if self._armed is not None and self._reference.get_subscription_count():
             self._run, self._armed, self._failed, self._end = self._armed, None, False, ""
+            self._held = None
+        if self._watch.stands(sample, self._held):
+            error = 1e3 * abs((self._held or 0.0) - sample.position)
+            self._finish(f"broken off: the plant stands at 0 V, {error:.1f} mm from its reference", failed=True)
+            self._held = None
         try:
             now = self._run.answer(sample) if self._run is not None else None
         except ControlError as error:
@@ -93,13 +100,12 @@ class ReferenceNode(ServedNode):
         run, self._run = self._run, None
         self._end, self._failed = f"{run.kind if run else 'reference'} {end}", failed
         (self.get_logger().error if failed else self.get_logger().info)(self._end)
-        if run is not None and self._table["output"] and not failed:
+        if run is not None and not failed:
             try:
-                document = {"kind": run.kind, "start_ns": run.start_ns, **run.response().as_document()}
-                Path(self._table["output"]).write_text(json.dumps(document) + "\n", encoding="utf-8")
-            except OSError as error:
+                self._output.write({"kind": run.kind, "start_ns": run.start_ns, **run.response().as_document()})
+            except ControlError as error:
                 self._failed = True
-                self.get_logger().error(f"{self._table['output']}: cannot be written: {error.strerror}")
+                self.get_logger().error(str(error))
         self.exit_code = int(self._failed)
         self.over = self.over or self._table["exit_when_done"]
         self._publish_health()
@@ -114,15 +120,18 @@ class ReferenceNode(ServedNode):
     def _start(self) -> str:
         if self._run is not None or self._armed is not None:
             raise ControlError("a run is on, or waits to start")
+        self._output.check()
         self._armed = self._make()
         return f"starting {self._armed.kind}, {self._armed.duration:g} s"
 
     def _stop(self) -> str:
-        if self._run is None and self._armed is None:
+        if self._run is None and self._armed is None and self._held is None:
             raise ControlError("nothing to stop")
         self._armed = None
         if self._run is not None:
             self._finish("broken off: asked to stop", failed=True)
+        else:
+            self._held = None
         return "stopped"
 
 

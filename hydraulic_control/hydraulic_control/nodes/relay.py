@@ -7,19 +7,19 @@ file that `tune --relay` reads.
 
 from __future__ import annotations
 
-import json
 import math
 import time
-from pathlib import Path
 from typing import Any
 
 from sensor_msgs.msg import JointState
 
+from hydraulic_control.errors import ControlError
 from hydraulic_control.relay import SPECS, Relay, RelaySettings
 from hydraulic_interfaces.contract import NAMESPACE, RELAY_NODE
 from hydraulic_interfaces.conversions import CommandEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.json_file import NewJson
 from hydraulic_node_utils.nodes.callbacks import understood
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
@@ -29,7 +29,7 @@ PARAMETERS = (
     *SPECS,
     ParameterSpec("start_timeout", 30.0, "longest wait for a plant that obeys", "s", 0.1, 3600.0),
     ParameterSpec("state_timeout", 0.1, "silence of the state that breaks it off", "s", 0.01, 10.0),
-    ParameterSpec("output", "", "JSON file for the result; empty: it is only told"),
+    ParameterSpec("output", "", "new JSON file for the result; empty: it is only told"),
 )
 STATE_DEPTH = 10
 _OBEYS_WITHIN_S = 0.05
@@ -42,7 +42,8 @@ class RelayNode(ServedNode):
         super().__init__(RELAY_NODE, namespace=NAMESPACE, **options)
         values = ParameterTable(self, PARAMETERS, locked=lambda: True).values()
         self._relay = Relay(RelaySettings(**{spec.name: values[spec.name] for spec in SPECS}))
-        self._output, self._patience = values["output"], time.monotonic() + values["start_timeout"]
+        self._output = NewJson(values["output"], ControlError)
+        self._patience = time.monotonic() + values["start_timeout"]
         self._timeout = values["state_timeout"]
         self._encode = CommandEncoder(RELAY_NODE)
         self._command = self.create_publisher(JointState, "command", profile("command"))
@@ -104,13 +105,12 @@ class RelayNode(ServedNode):
             self.get_logger().error(f"broken off: {self._relay.trouble}")
             return
         self.get_logger().info(f"critical gain {result.gain:.4g} V/m, critical period {1e3 * result.period:.4g} ms")
-        if self._output:
-            settings = {"amplitude": self._relay.settings.amplitude, "hysteresis": self._relay.settings.hysteresis}
-            try:
-                Path(self._output).write_text(json.dumps({**result.as_document(), **settings}) + "\n", encoding="utf-8")
-            except OSError as error:
-                self.exit_code = 1
-                self.get_logger().error(f"{self._output}: cannot be written: {error.strerror}")
+        settings = {"amplitude": self._relay.settings.amplitude, "hysteresis": self._relay.settings.hysteresis}
+        try:
+            self._output.write({**result.as_document(), **settings})
+        except ControlError as error:
+            self.exit_code = 1
+            self.get_logger().error(str(error))
 
 
 def main(argv: list[str] | None = None) -> int:

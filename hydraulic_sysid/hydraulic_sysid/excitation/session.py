@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 from hydraulic_interfaces.contract import ABORTED, EXCITATION_NODE, FINISHED, STARTED
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.plant_report import PlantReport
 from hydraulic_sysid.excitation.applied import AppliedDriveCheck
 from hydraulic_sysid.excitation.plan import Plan
-from hydraulic_sysid.excitation.plant_report import PlantReport
 from hydraulic_sysid.excitation.run import ExcitationRun, Phase
 
 NOT_STARTED = "not started"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hydraulic_interfaces.errors import HydraulicError
+from hydraulic_node_utils.whole_file import write_text
 
 
 def read_json(path: Path, error: type[HydraulicError]) -> Any:
@@ -20,3 +21,40 @@ def read_json(path: Path, error: type[HydraulicError]) -> Any:
         raise error(f"{path}: cannot be read ({problem.strerror})") from problem
     except ValueError as problem:
         raise error(f"{path}: not a JSON document ({problem})") from problem
+
+
+class NewJson:
+    """A JSON file that a node is to write at the end of a run, named at its start; what is there is never replaced.
+
+    :raises error: something is at ``path`` already. An empty ``path`` is no file, and `write` does nothing.
+    """
+
+    def __init__(self, path: str, error: type[HydraulicError]) -> None:
+        self._path = Path(path).expanduser() if path else None
+        self._error = error
+        self.check()
+
+    def check(self) -> None:
+        """To be called before a run: may the file be written?
+
+        :raises error: something is there, or the path names no file.
+        """
+        path = self._path
+        if path is None:
+            return
+        if path.exists() or path.is_symlink():
+            raise self._error(f"output: {path} exists and is not replaced; name another file")
+        if not path.name:
+            raise self._error(f"output: {path} names no file")
+
+    def write(self, document: Any) -> None:
+        """Create the file, whole.
+
+        :raises error: it cannot be written, or something has come there meanwhile.
+        """
+        if self._path is None:
+            return
+        try:
+            write_text(self._path, json.dumps(document) + "\n", overwrite=False)
+        except OSError as problem:
+            raise self._error(f"output: {self._path}: cannot be written ({problem.strerror})") from problem

@@ -1,4 +1,4 @@
-"""What the plant says about itself on `/diagnostics`, as far as an excitation must know."""
+"""What the plant says about itself on `/diagnostics`, as far as a source of commands must know."""
 
 from __future__ import annotations
 
@@ -37,6 +37,13 @@ class PlantReport:
         """The other source that the plant obeys now; empty when there is none."""
         source = self._rows.get(COMMAND_ROW, ("", {}))[1].get("source", "")
         return "" if source == own else source
+
+    def disobedience(self, own: str) -> str:
+        """Why the plant does not obey the source `own`; empty where it does, or has not said anything yet."""
+        if PLANT_ROW in self._rows and self.disabled:
+            return self.disabled
+        source = self.foreign_source(own)
+        return f"it obeys {source!r}" if source else ""
 
     @property
     def trouble(self) -> str:
