@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from hydraulic_can_driver.bus import Bus, Node
+from hydraulic_can_driver.can_bus import PROGRAMS_ONLY
 from hydraulic_can_driver.cia408 import CONTROL_WORDS, State, StateMachine, describe, state_of
 from hydraulic_can_driver.codec import PdoCodec
 from hydraulic_can_driver.errors import BusDownError, DeviceError
@@ -27,9 +28,6 @@ from hydraulic_interfaces.samples import PlantSample
 
 KERNEL_SYNC = ("socketcan",)
 """Interfaces whose kernel sends messages periodically by itself."""
-
-PROGRAMS_ONLY = ("virtual", "udp_multicast")
-"""Interfaces on which there are no devices but virtual ones: only those can wait."""
 
 _QUIET = (State.INIT, State.DISABLED, State.FAULT_DISABLED, State.NOT_READY)
 """States in which the spool does not follow the setpoint; the last two only after a fault."""

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import can
 
 from hydraulic_can_driver.errors import BusDownError
 
+PROGRAMS_ONLY = ("virtual", "udp_multicast")
+"""Interfaces on which there are no devices but virtual ones: only those can wait."""
+
+_SYSTEM_NETWORK = Path("/sys/class/net")
 _ADDRESS_AND_PORT = re.compile(r"(?P<group>[\d.]+):(?P<port>\d+)")
 
 
@@ -30,6 +35,14 @@ def open_can(interface: str, channel: str, bitrate: int = 1_000_000) -> can.BusA
         return can.Bus(**options)
     except (can.CanError, OSError, ValueError, ImportError, TypeError) as error:
         raise BusDownError(f"CAN interface {interface}, channel {channel!r}: {error or type(error).__name__}") from None
+
+
+def programs_only(interface: str, channel: str) -> bool:
+    """Whether nothing but programs can be on a bus: no actuator that moves."""
+    if interface == "socketcan" and channel.startswith(("vcan", "vxcan")):
+        # A serial adapter is such a device of the kernel, too, but not by that name.
+        return "virtual" in (_SYSTEM_NETWORK / channel).resolve().parts
+    return interface in PROGRAMS_ONLY
 
 
 def hears_itself(interface: str) -> bool:

@@ -31,15 +31,22 @@ class IntegratorPlant(PlantBackend):
             ),
             ParameterSpec("real_time_factor", 1.0, "plant seconds per wall second", "1", 0.01, 100.0),
             ParameterSpec("publish_clock", False, "be the clock"),
+            ParameterSpec("hardware", "", "what it pretends to hang on"),
         )
+
+    def hardware(self, values: Mapping[str, Any]) -> str:
+        return str(values["hardware"])
 
     def configure(self, values: Mapping[str, Any]) -> Sequence[ParameterSpec]:
         self._journal, self._trouble = values["journal"], values["trouble"]
-        self._gain, self._position, self._velocity = 0.05, 0.0, 0.0
+        self._gain, self._position, self._velocity, self._drift = 0.05, 0.0, 0.0, 0.0
         self._note("configure")
         if self._trouble == "configure":
             raise BackendError("no plant behind this name")
-        return (ParameterSpec("model.gain", self._gain, "velocity per drive", "m/s/V", 0.0, 1.0, live=True),)
+        return (
+            ParameterSpec("model.gain", self._gain, "velocity per drive", "m/s/V", 0.0, 1.0, live=True),
+            ParameterSpec("model.drift", self._drift, "velocity at 0 V", "m/s", -1.0, 1.0, live=True),
+        )
 
     def set_parameter(self, name: str, value: Any) -> None:
         if value == REFUSED_GAIN:
@@ -47,7 +54,7 @@ class IntegratorPlant(PlantBackend):
         if self._trouble == "set":
             self._note("set hangs")
             time.sleep(3600.0)
-        self._gain = value
+        setattr(self, name.replace("model.", "_"), value)
         self._note(f"set {name} {value}")
 
     def description(self) -> Mapping[str, Any]:
@@ -83,7 +90,7 @@ class IntegratorPlant(PlantBackend):
             limit_retracted=self._position <= -STROKE / 2,
             limit_extended=self._position >= STROKE / 2,
         )
-        self._velocity = self._gain * drive
+        self._velocity = self._gain * drive + self._drift
         self._position = min(max(self._position + self._velocity * dt, -STROKE / 2), STROKE / 2)
         self._last = drive
         return sample

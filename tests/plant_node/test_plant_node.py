@@ -186,7 +186,7 @@ def test_a_value_that_the_plant_refuses_changes_nothing(
     wait_until(lambda: client.state() == "active", "an active plant")
 
     def values() -> list[float]:
-        names = ["watchdog", "model.gain"]
+        names = ["model.drift", "model.gain"]
         answer = client.call("rcl_interfaces/srv/GetParameters", f"{PLANT}/get_parameters", names=names)
         return [value.double_value for value in answer.values]
 
@@ -197,17 +197,37 @@ def test_a_value_that_the_plant_refuses_changes_nothing(
     # Of a request that is to be taken as a whole, what was applied already is taken back.
     both = [
         Parameter(name=name, value=ParameterValue(type=3, double_value=value))
-        for name, value in (("watchdog", 0.5), ("model.gain", 0.75))
+        for name, value in (("model.drift", 0.5), ("model.gain", 0.75))
     ]
     kind, name = "rcl_interfaces/srv/SetParametersAtomically", f"{PLANT}/set_parameters_atomically"
     refused = client.call(kind, name, parameters=both).result
     assert not refused.successful and "cannot follow" in refused.reason
     assert values() == before
-    health = client.diagnostics()  # from after the refusal
-    wait_until(lambda: health["watchdog_s"], "the watchdog time in use")
-    assert health["watchdog_s"] == "2"
+    assert journal.read_text().splitlines()[-2:] == ["set model.drift 0.5", "set model.drift 0.0"]
     assert set_parameter(client, "model.gain", 0.25).successful and values()[1] == 0.25
     assert "set model.gain 0.75" not in journal.read_text()
+
+
+def test_two_publishers_of_one_name_and_a_longer_watchdog(start: Any, client: Any, wait_until: Any) -> None:
+    process = start("-p", "enable_on_activate:=true")
+    states, health = client.collect("state"), client.diagnostics()
+    client.source("controller", 4.0)
+    wait_until(lambda: states and states[-1].effort[1] == 4.0, "the drive of the first")
+    client.source("controller", -4.0)
+    wait_until(lambda: health.count("other_publisher") > 100, "the second counted")
+    assert {state.effort[1] for state in states} <= {0.0, 4.0}
+    assert health["command level"] == "1" and health["second_publisher_of"] == "controller"
+    assert process.output().count("a second publisher commands as 'controller' and is refused") == 1
+    refused = set_parameter(client, "watchdog", 5.0)
+    assert not refused.successful and "read when the node is configured" in refused.reason
+
+
+def test_a_real_actuator_has_a_short_watchdog(start: Any, client: Any) -> None:
+    process = start("-p", "hardware:=can0", autostart=False)
+    assert not client.change_state("configure")
+    process.says("watchdog is 2 s: an actuator on can0 must not be driven for longer without a command than 0.2 s")
+    assert set_parameter(client, "watchdog", 0.2).successful
+    assert client.change_state("configure")
 
 
 def test_a_misspelt_parameter_is_named(start: Any) -> None:

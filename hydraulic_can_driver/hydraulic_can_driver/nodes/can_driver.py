@@ -10,6 +10,7 @@ from typing import Any
 from hydraulic_can_driver import readback
 from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus_file import load_bus
+from hydraulic_can_driver.can_bus import programs_only
 from hydraulic_can_driver.cia408 import State, describe
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.parameter_spec import ParameterSpec
@@ -38,6 +39,15 @@ class CanPlant(PlantBackend):
     def parameters(self) -> Sequence[ParameterSpec]:
         """See `PlantBackend.parameters`."""
         return PARAMETERS
+
+    def hardware(self, values: Mapping[str, Any]) -> str:
+        """Interface and channel, unless only programs are on it.
+
+        :raises BusFileError: the bus file is not acceptable.
+        """
+        bus = load_bus(values["bus"])
+        interface, channel = values["interface"] or bus.interface, values["channel"] or bus.channel
+        return "" if programs_only(interface, channel) else f"{interface} {channel}"
 
     def configure(self, values: Mapping[str, Any]) -> Sequence[ParameterSpec]:
         """Open the bus, check who is there, boot and map all devices, read back what they are set to.

@@ -86,7 +86,7 @@ class ControllerNode(Served, LifecycleNode):
         """0 V, then silence."""
         self._state = "inactive"
         self._session.begin()
-        self._command.publish(self._encode(self._stamp_ns, 0.0))
+        self._command.publish(self._encode(self._stamp_ns + 1, 0.0))
         release_realtime_for_all()
         return SUCCESS
 

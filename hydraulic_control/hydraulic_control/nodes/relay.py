@@ -69,7 +69,7 @@ class RelayNode(ServedNode):
     def close(self) -> None:
         """0 V at the end."""
         if self._stamp_ns is not None:
-            self._command.publish(self._encode(self._stamp_ns, 0.0))
+            self._command.publish(self._encode(self._stamp_ns + 1, 0.0))
 
     def _on_state(self, message: JointState) -> None:
         sample = understood(self, "state", sample_from_messages, message)

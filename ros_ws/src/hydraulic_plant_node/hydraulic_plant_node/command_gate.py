@@ -4,8 +4,10 @@ Rules, the same for a simulated and a real actuator:
 
 - A command must be finite, name its source, and be no older than the watchdog time (nor as far in the future:
   its sender uses another clock). Anything else is rejected and counted. Out of range is clamped and counted.
+- The stamps of a source advance: a command that is stamped no later than one that was obeyed is refused.
 - The first source heard is obeyed; another one is refused until the first has been silent for the watchdog
-  time.
+  time. So is another publisher that uses the same name: its messages are not the next ones of the publisher in
+  command. Where the counts of two publishers meet, nobody can tell them apart any more, and both are stopped.
 - Without a valid command for the watchdog time the drive is 0 V; the next valid command re-arms it.
 - A stop (emergency or fault) is latched until `reset`. Reset leaves the gate disabled: moving again takes
   `enable`.
@@ -37,6 +39,8 @@ class Verdict(Enum):
     STALE = "rejected: older than the watchdog time"
     FUTURE = "rejected: stamped in the future, the sender uses another clock"
     OTHER_SOURCE = "refused: another source is in command"
+    OTHER_PUBLISHER = "refused: not of the publisher in command, which has the same name"
+    OUT_OF_ORDER = "refused: not stamped later than the last"
     DISABLED = "refused: not enabled"
     STOPPED = "refused: stopped until reset"
 
@@ -47,7 +51,10 @@ class Verdict(Enum):
 
 
 class CommandGate:
-    """Decides which commands count and what drive [V] applies; `limit` in V, `watchdog` in s."""
+    """Decides which commands count and what drive [V] applies; `limit` in V, `watchdog` in s.
+
+    `rivalled` is the name of the last source that a second publisher has used while it was in command.
+    """
 
     def __init__(self, limit: float = DRIVE_LIMIT_V, watchdog: float = WATCHDOG_S) -> None:
         if not (math.isfinite(limit) and limit > 0.0):
@@ -59,7 +66,10 @@ class CommandGate:
         self.enabled = False
         self.stop_reason = ""
         self.last_problem = ""
+        self.rivalled = ""
         self._source = ""
+        self._number: int | None = None
+        self._stamps_ns: dict[str, int] = {}
         self._drive = 0.0
         self._heard_ns: int | None = None
         self._answered_ns = (0, 0)
@@ -121,12 +131,18 @@ class CommandGate:
         """Seconds since the last obeyed command arrived; NaN when no source is in command."""
         return math.nan if self._heard_ns is None else (now_ns - self._heard_ns) * 1e-9
 
-    def accept(self, command: Command, now_ns: int) -> Verdict:
-        """Judge a command that arrived at `now_ns`, and hold its drive if it is obeyed."""
+    def accept(self, command: Command, now_ns: int, number: int | None = None, alone: bool = True) -> Verdict:
+        """Judge a command that arrived at `now_ns`, and hold its drive if it is obeyed.
+
+        `number`: the count of this message at its publisher, where the middleware gives it. Only where its publisher
+        is `alone` on the topic may numbers be missing in between.
+        """
         self._follow_changes()
-        verdict = self._judge(command, now_ns)
+        verdict = self._judge(command, now_ns, number, alone)
         self.counts[verdict] += 1
         if verdict.obeyed:
+            self._remember(command, now_ns)
+            self._number = number
             self._source = command.source
             self._drive = min(max(command.drive, -self.limit), self.limit)
             self._heard_ns = now_ns
@@ -153,7 +169,7 @@ class CommandGate:
             self._release()
         return self._drive
 
-    def _judge(self, command: Command, now_ns: int) -> Verdict:
+    def _judge(self, command: Command, now_ns: int, number: int | None, alone: bool) -> Verdict:
         age_ns = now_ns - command.stamp_ns
         if not command.source:
             return Verdict.UNNAMED
@@ -169,7 +185,33 @@ class CommandGate:
             return Verdict.DISABLED
         if self._in_command(now_ns) and command.source != self._source:
             return Verdict.OTHER_SOURCE
+        if self._in_command(now_ns) and not self._follows(number, alone):
+            self._meet_rival(number, now_ns)
+            return Verdict.OTHER_PUBLISHER
+        last_ns = self._stamps_ns.get(command.source)
+        # A last stamp that would be refused now itself is that of a clock which was set back.
+        if last_ns is not None and command.stamp_ns <= last_ns <= now_ns + self._watchdog_ns:
+            return Verdict.OUT_OF_ORDER
         return Verdict.ACCEPTED if abs(command.drive) <= self.limit else Verdict.CLAMPED
+
+    def _follows(self, number: int | None, alone: bool) -> bool:
+        """Whether the publisher in command may have sent this number."""
+        if number is None or self._number is None:
+            return True
+        return number > self._number if alone else number == self._number + 1
+
+    def _meet_rival(self, number: int | None, now_ns: int) -> None:
+        self.rivalled = self._source
+        # The counts meet. A silent publisher will not go on from here, one that speaks will.
+        if number == self._number and self.age(now_ns) <= WATCHDOG_S:
+            self.stop(f"two publishers call themselves {self._source!r} and cannot be told apart")
+
+    def _remember(self, command: Command, now_ns: int) -> None:
+        """Keep the stamp of an obeyed command for as long as its age alone would not give a replay away."""
+        if command.source not in self._stamps_ns:
+            near = {name: at for name, at in self._stamps_ns.items() if abs(now_ns - at) <= self._watchdog_ns}
+            self._stamps_ns = near
+        self._stamps_ns[command.source] = command.stamp_ns
 
     def _in_command(self, now_ns: int) -> bool:
         # A clock that jumped back must not keep an old command alive.
@@ -182,4 +224,4 @@ class CommandGate:
             self._release()
 
     def _release(self) -> None:
-        self._source, self._drive, self._heard_ns = "", 0.0, None
+        self._source, self._drive, self._heard_ns, self._number = "", 0.0, None, None

@@ -43,6 +43,10 @@ class PlantBackend(ABC):
         """Parameters known before anything is loaded; their values come with `configure`."""
         return ()
 
+    def hardware(self, values: Mapping[str, Any]) -> str:
+        """Name of what a real actuator hangs on, "" where nothing real moves; asked before `configure`, same values."""
+        return ""
+
     @abstractmethod
     def configure(self, values: Mapping[str, Any]) -> Sequence[ParameterSpec]:
         """Load, connect, compile: whatever takes long. Returns the parameters that are known only now."""

@@ -28,7 +28,7 @@ class PlantHealth:
         """Changes of this value are worth a message at once."""
         gate = self._gate
         refused = sum(count for verdict, count in gate.counts.items() if verdict is not Verdict.ACCEPTED)
-        return gate.enabled, gate.stop_reason, gate.timeouts, gate.source, bool(refused)
+        return gate.enabled, gate.stop_reason, gate.timeouts, gate.source, bool(refused), gate.rivalled
 
     def message(self, state: str, loop: PlantLoop | None, error: str, now_ns: int) -> DiagnosticArray:
         """The diagnostics now; `state` is the lifecycle state, `error` what made the node leave `active`."""
@@ -64,6 +64,7 @@ class PlantHealth:
             "watchdog_s": f"{gate.watchdog:g}",
             "timeouts": gate.timeouts,
             "last_problem": gate.last_problem,
+            "second_publisher_of": gate.rivalled,
             **counts,
         }
         timeouts = self._moved("timeouts", gate.timeouts)

@@ -22,6 +22,7 @@ from hydraulic_node_utils.nodes.guarded_lifecycle import guard_transitions
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.nodes.plant_guard import PlantGuard
 from hydraulic_plant_node.nodes.plant_health import PlantHealth
 from hydraulic_plant_node.nodes.plant_ports import PlantPorts
 from hydraulic_plant_node.plant_backend import PlantBackend
@@ -38,7 +39,7 @@ _HANGS = "the plant loop hangs in its backend"
 
 PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("rate", RATE_HZ, "sampling rate of the plant", "Hz", 1.0, 5000.0),
-    ParameterSpec("watchdog", WATCHDOG_S, "silence of the source until 0 V", "s", 0.002, 10.0, live=True),
+    ParameterSpec("watchdog", WATCHDOG_S, "silence of the source until 0 V; hardware: 0.2 at most", "s", 0.002, 10.0),
     ParameterSpec("enable_on_activate", False, "obey commands from activation on, without `enable`"),
     ParameterSpec("autostart", False, "configure and activate at start"),
     ParameterSpec("lockstep", False, "plant time waits for the answer to each state; publishes /clock"),
@@ -66,8 +67,9 @@ class PlantNode(LifecycleNode):
         self._late_parameters: list[str] = []
         self.gate = CommandGate()
         self._table = ParameterTable(self, parameters_of(backend), self._apply, lambda: self._state != "unconfigured")
-        self.gate.watchdog = self._table["watchdog"]
         self._ports = PlantPorts(self)
+        self._guard = PlantGuard(self, self.gate, backend)
+        self._followed = False
         self._health = PlantHealth(self.get_fully_qualified_name(), self.gate, backend)
         self._diagnostics = self.create_publisher(
             interface_class("diagnostic_msgs/msg/DiagnosticArray"), "/diagnostics", profile("diagnostics")
@@ -109,6 +111,8 @@ class PlantNode(LifecycleNode):
                 raise ValueError("use_sim_time is true: a plant follows no other clock, it may only publish one")
             factor = values.get("real_time_factor", 1.0)
             LoopTiming(1, factor, own_clock, lockstep)  # refuses what contradicts itself before anything is loaded
+            self._guard.admit(values)
+            self.gate.watchdog = values["watchdog"]
             late = self._backend.configure(values)
             period_ns = round(1e9 / self._backend.sampling_rate(values))
             priority = 0 if lockstep else values["realtime_priority"]  # nothing is gained by being in time
@@ -228,7 +232,8 @@ class PlantNode(LifecycleNode):
         return False
 
     def _switch(self, on: bool) -> None:
-        self._backend.set_enabled(self.gate.enable(on) and on)
+        self._followed = self.gate.enable(on) and on
+        self._backend.set_enabled(self._followed)
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if request.data and self._state != "active":
@@ -250,12 +255,16 @@ class PlantNode(LifecycleNode):
         self.gate.stop("emergency stop")
         response.success, response.message = True, "stopped: 0 V until reset"
         self.get_logger().warning("emergency stop")
+        self._disable()
+        return response
+
+    def _disable(self) -> None:
+        """Let the backend follow a gate that holds 0 V already."""
+        self._followed = False
         try:
             self._backend.set_enabled(False)
         except Exception as error:
-            # The gate holds 0 V all the same.
             self.get_logger().error(f"disabling failed: {error}")
-        return response
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
@@ -268,9 +277,7 @@ class PlantNode(LifecycleNode):
         return response
 
     def _apply(self, name: str, value: Any) -> None:
-        if name == "watchdog":
-            self.gate.watchdog = value
-        elif self._state != "unconfigured":
+        if self._state != "unconfigured":
             self._backend.set_parameter(name, value)
 
     def _autostart(self) -> None:
@@ -283,6 +290,10 @@ class PlantNode(LifecycleNode):
         loop = self._loop
         if loop is not None and loop.error is not None:
             self.trigger_deactivate()
+        self._guard.watch()
+        if self._followed and self.gate.stopped and not self._backend.fault:  # a fault is the backend's own affair
+            self.get_logger().error(f"stopped until reset: {self.gate.stop_reason}")
+            self._disable()
         urgent = self._health.urgent()
         if urgent != self._watched or self._watch_count % _REPORT_EVERY == 0:
             self._watched = urgent

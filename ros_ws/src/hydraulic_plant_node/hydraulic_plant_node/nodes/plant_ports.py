@@ -49,13 +49,14 @@ class PlantPorts:
     def take_commands(self, gate: CommandGate, now_ns: int) -> None:
         """Put every waiting command through the gate."""
         # A source that floods the topic must not hold up the plant's cycle.
-        for message in islice(self._commands.take(), STREAM_DEPTH):
+        for message, info in islice(self._commands.take_with_info(), STREAM_DEPTH):
             try:
                 command = command_from_message(message)
             except MessageError as error:
                 gate.reject(str(error))
             else:
-                gate.accept(command, now_ns)
+                alone = self._commands.publishers <= 1
+                gate.accept(command, now_ns, info["publication_sequence_number"], alone)
 
     def wait_for_command(self, seconds: float) -> None:
         """Return when a command waits, or after that time."""
