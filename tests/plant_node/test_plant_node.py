@@ -20,7 +20,9 @@ def journal(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def start(launch: Any, journal: Path) -> Callable[..., Any]:
+def start(launch: Any, journal: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    monkeypatch.setenv("XDG_STATE_HOME", str(journal.with_name("state")))
+
     def run(*ros: str, autostart: bool = True) -> Any:
         options = ["--autostart"] if autostart else []
         return launch(SCRIPT, *options, "--ros-args", "-p", f"journal:={journal}", "-p", "watchdog:=2.0", *ros)
@@ -228,6 +230,35 @@ def test_a_real_actuator_has_a_short_watchdog(start: Any, client: Any) -> None:
     process.says("watchdog is 2 s: an actuator on can0 must not be driven for longer without a command than 0.2 s")
     assert set_parameter(client, "watchdog", 0.2).successful
     assert client.change_state("configure")
+
+
+def test_a_real_actuator_remembers_a_stop_and_an_end_that_nobody_ordered(
+    start: Any, client: Any, wait_until: Any
+) -> None:
+    real = ("-p", "hardware:=can0", "-p", "watchdog:=0.2")
+    process = start(*real, "-p", "enable_on_activate:=true", autostart=False)
+    assert not client.change_state("configure")
+    process.says("enable_on_activate: an actuator on can0 is enabled by the service alone")
+    process.end()
+
+    def again(last: Any, number: int) -> Any:
+        last.interrupt(number)
+        last.wait()
+        process = start(*real)
+        wait_until(lambda: client.state() == "active", "an active plant")
+        return process
+
+    process = start(*real)
+    wait_until(lambda: client.state() == "active", "an active plant")
+    assert enable(client).success
+    process = again(process, signal.SIGKILL)
+    refusal = enable(client)
+    assert not refusal.success and "ended without a word" in refusal.message and "reset" in refusal.message
+    assert client.call("std_srvs/srv/Trigger", "/actuator/reset").success
+    assert enable(client).success
+    assert client.call("std_srvs/srv/Trigger", "/actuator/emergency_stop").success
+    process = again(process, signal.SIGTERM)
+    assert "from before this start: emergency stop" in enable(client).message
 
 
 def test_a_misspelt_parameter_is_named(start: Any) -> None:

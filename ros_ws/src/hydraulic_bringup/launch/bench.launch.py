@@ -5,7 +5,8 @@
     ros2 launch hydraulic_bringup bench.launch.py plant:=can bus:=my_bench.yaml record:=/tmp/bag experiment:=chirp
     ros2 launch hydraulic_bringup bench.launch.py plant:=sim enable:=true controller:=npid reference:=staircase
 
-The plant is configured and activated; it moves nothing until `enable` is called (or enable:=true is given).
+The plant is configured and activated; it moves nothing until `enable` is called (or enable:=true is given, which a plant
+on hardware refuses).
 """
 
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
@@ -30,7 +31,7 @@ ARGUMENTS = (
     ("interface", "", "python-can interface of the CAN driver; empty: that of the bus file"),
     ("channel", "", "channel of that interface, such as can0; empty: that of the bus file"),
     ("params", "", "parameter file (default: config/bench.yaml or config/can.yaml of this package)"),
-    ("enable", "false", "let commands through as soon as the plant is active"),
+    ("enable", "false", "let commands through as soon as the plant is active; refused by a plant on hardware"),
     ("record", "", "folder of a new bag; empty: nothing is recorded"),
     ("experiment", "", "excitation plan (file or shipped name) to play; empty: none"),
     ("controller", "", "law that closes the loop: npid, pid or pole_placement; empty: none"),

@@ -40,7 +40,7 @@ _HANGS = "the plant loop hangs in its backend"
 PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("rate", RATE_HZ, "sampling rate of the plant", "Hz", 1.0, 5000.0),
     ParameterSpec("watchdog", WATCHDOG_S, "silence of the source until 0 V; hardware: 0.2 at most", "s", 0.002, 10.0),
-    ParameterSpec("enable_on_activate", False, "obey commands from activation on, without `enable`"),
+    ParameterSpec("enable_on_activate", False, "obey commands from activation on, without `enable`; not on hardware"),
     ParameterSpec("autostart", False, "configure and activate at start"),
     ParameterSpec("lockstep", False, "plant time waits for the answer to each state; publishes /clock"),
     ParameterSpec("realtime_priority", 20, "FIFO priority of the loop where permitted, 0: none", "", 0, 98),
@@ -111,7 +111,7 @@ class PlantNode(LifecycleNode):
                 raise ValueError("use_sim_time is true: a plant follows no other clock, it may only publish one")
             factor = values.get("real_time_factor", 1.0)
             LoopTiming(1, factor, own_clock, lockstep)  # refuses what contradicts itself before anything is loaded
-            self._guard.admit(values)
+            self._guard.enter(values)
             self.gate.watchdog = values["watchdog"]
             late = self._backend.configure(values)
             period_ns = round(1e9 / self._backend.sampling_rate(values))
@@ -220,6 +220,7 @@ class PlantNode(LifecycleNode):
             self._backend.cleanup()
         except Exception as error:
             self._complain(f"cleanup failed: {error}")
+        self._guard.leave()
 
     def _hangs(self) -> bool:
         """Whether a loop that hung still does; once it has ended, the plant is released."""
