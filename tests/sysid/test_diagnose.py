@@ -52,7 +52,7 @@ def model():
 
 
 def test_every_third_block_validates_shifting_between_records(model) -> None:
-    parts = split([standing(20.0, "a"), standing(20.0, "b")], [], model.kind, 0.5)
+    parts = split([standing(20.0, "a"), standing(20.0, "b")], [], model, 0.5)
     shares = [float(f.mean()) for f in parts.fit]
     assert all(0.6 <= s <= 0.72 for s in shares)
     assert not np.array_equal(parts.fit[0], parts.fit[1])
@@ -61,7 +61,7 @@ def test_every_third_block_validates_shifting_between_records(model) -> None:
 
 
 def test_named_records_are_for_validation_whole(model) -> None:
-    parts = split([standing(5.0, "a")], [standing(5.0, "b")], model.kind, 0.5)
+    parts = split([standing(5.0, "a")], [standing(5.0, "b")], model, 0.5)
     assert parts.fit[0].all() and not parts.fit[1].any()
     assert [s.record.name for s in parts.to_fit] == ["a"] == [r.name for r in parts.records()]
     assert [r.name for r in parts.records(validation=True)] == ["b"]

@@ -163,7 +163,7 @@ def test_the_residual_is_tested_for_whiteness(model: Model, runs) -> None:
 def test_of_very_long_records_blocks_are_left_out(model: Model) -> None:
     time = DT * np.arange(400_000)
     channels = {c: np.sin(time) for c in ("drive", *NOISE)}
-    long = split([Record.sampled("long", DT, channels)], (), model.kind, 0.5)
+    long = split([Record.sampled("long", DT, channels)], (), model, 0.5)
     assert 0.4 * MOST_VALUES < sum(s.measured.size for s in long.segments) < 1.1 * MOST_VALUES
     (segments,), (fit,) = long.segments, long.fit
     assert 0.6 < fit.mean() < 0.72 and segments.first[-1] > 0.97 * time.size

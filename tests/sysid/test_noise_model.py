@@ -144,3 +144,14 @@ def test_spikes_are_found_and_peaks_of_pressure_are_not() -> None:
     spoiled = pressure.copy()
     spoiled[places] += 50.0 * 8e3
     assert np.array_equal(np.flatnonzero(spikes(spoiled)), places)
+
+
+def test_noise_that_is_louder_in_some_segments_has_its_strength_there() -> None:
+    strength = np.repeat([1.0, 1.6], 30)
+    loud = [strength[:, None] * np.random.default_rng(3).standard_normal((60, 500))]
+    noise = estimate(loud, DT)
+    (found,) = noise_model.loudness(loud, noise)
+    level = found * noise.std
+    assert np.abs(level / strength - 1.0).max() < 0.15 and abs(np.mean(level / strength) - 1.0) < 0.03
+    steady = [np.random.default_rng(4).standard_normal((60, 500))]
+    assert np.array_equal(noise_model.loudness(steady, estimate(steady, DT))[0], np.ones(60))

@@ -11,8 +11,10 @@ import pytest
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations, minimise
+from hydraulic_sysid.estimation.noise import robust_noise_std
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.projection import Projection
@@ -157,3 +159,17 @@ def test_another_noise_judges_the_same_deviations() -> None:
     assert np.allclose(judged.in_units(judged.deviation(run, none)), -1.0)
     measured = [k for k, free in enumerate(segments.unmeasured_pressures) if not free and segments.free[k] != 1]
     assert np.allclose(judged.prior_std[measured], 2.0 * segments.prior_std[measured])
+
+
+def test_of_one_pressure_in_each_record_both_may_be_late() -> None:
+    def shown(*channels: str) -> set[str]:
+        return {h.name for h in HYPOTHESES if h.shown_by(set(channels))}
+
+    assert shown("position", "pressure_a", "pressure_b") == {h.name for h in HYPOTHESES}
+    assert shown("position", "pressure_a") == {"pressure_a", "pressure_a_low_pass", "drive", "position"}
+    assert shown("position") == {"position"}
+
+
+def test_the_levels_of_a_command_are_no_noise_on_it() -> None:
+    command = np.repeat([0.0, 3.0, 0.0, -3.0], 500)
+    assert robust_noise_std(command, rounded=False) == 0.0 < robust_noise_std(command)

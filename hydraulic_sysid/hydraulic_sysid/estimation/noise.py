@@ -69,16 +69,19 @@ def noise_std(signal: ArrayLike) -> float:
     return float(max(np.sqrt(np.median(whole)), resolution(y) / np.sqrt(12.0)))
 
 
-def robust_noise_std(signal: ArrayLike) -> float:
+def robust_noise_std(signal: ArrayLike, rounded: bool = True) -> float:
     """As `noise_std`, of a signal ``(N,)`` in which a few samples are wild; motion counts more.
 
     The median of all squared differences instead of that of the blocks' means: of normal noise it is 0.455 of the
     mean (the median of χ² with one degree of freedom), and an outlier spoils five of them, not a block.
 
+    :param rounded: the values may have been rounded to their smallest step; of a command, its steps are meant
+
     :raises ValueError: for fewer than 20 samples.
     """
     y = _checked(signal)
-    return float(max(np.sqrt(np.median(_squares(y)) / chi2.median(1)), resolution(y) / np.sqrt(12.0)))
+    least = resolution(y) / np.sqrt(12.0) if rounded else 0.0
+    return float(max(np.sqrt(np.median(_squares(y)) / chi2.median(1)), least))
 
 
 def spikes(signal: ArrayLike) -> Mask:

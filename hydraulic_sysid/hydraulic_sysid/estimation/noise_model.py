@@ -34,6 +34,10 @@ WITHIN = 3.5  # standard deviations of a mean square above which a segment holds
 OUTLIER = 6.0  # innovations' standard deviations
 MAINS = (50.0, 60.0)  # Hz
 HARMONICS = (1, 2, 3, 5)
+UNSTEADY = 0.25  # spread of the logarithm of the power between segments, beyond chance, from which noise is not steady
+LOUDEST = 2.0  # of that logarithm, to either side
+QUARTILES = 1.349  # standard deviations between those of a normal distribution
+FEWEST = 20  # segments that show a spread
 STANDS_OUT = 25.0  # power of a line over the median power around it
 
 
@@ -124,6 +128,32 @@ def estimate(residuals: Sequence[Array], dt: float, order: int = ORDER) -> Chann
     coefficients = np.concatenate(([1.0], -solve_toeplitz(covariance[:-1], covariance[1:]))) if order else np.ones(1)
     innovation = max(float(coefficients @ covariance), np.finfo(float).tiny) ** 0.5
     return ChannelNoise(coefficients, innovation, covariance)
+
+
+def loudness(residuals: Sequence[Array], noise: ChannelNoise) -> list[Array]:
+    """By how many times the noise is stronger in each segment (S_i,) than `noise` says, of residuals (S_i, n_i).
+
+    Noise of valves, pumps and amplifiers depends on what they do. It is judged in the upper half of the band, where a
+    plant is quiet and a model's error is small. What is chance or the matter of a few segments does not count: then all
+    are as loud.
+    """
+    power, worth = [], []
+    for r in residuals:
+        spectrum = np.abs(np.fft.rfft(noise.whiten(r), axis=1)) ** 2 / r.shape[1]
+        upper = spectrum[:, spectrum.shape[1] // 2 :]
+        power.append(upper.mean(axis=1))
+        worth.append(np.full(len(r), 1.0 / upper.shape[1]))
+    every, chance = np.concatenate(power), np.concatenate(worth)
+    level = np.log(np.maximum(every, 1e-12))
+    low, middle, high = np.quantile(level, [0.25, 0.5, 0.75]).tolist()
+    spread = ((high - low) / QUARTILES) ** 2 - float(chance.mean())
+    if every.size < FEWEST or spread < UNSTEADY**2:
+        return [np.ones(len(r)) for r in residuals]
+    shrunk = [
+        middle + (np.log(np.maximum(p, 1e-12)) - middle) * spread / (spread + w)
+        for p, w in zip(power, worth, strict=True)
+    ]
+    return [np.exp(0.5 * np.clip(at, -LOUDEST, LOUDEST)) for at in shrunk]
 
 
 def _spectrum(residuals: Sequence[Array], kept: Mask) -> Array:

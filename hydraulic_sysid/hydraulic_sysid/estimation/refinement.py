@@ -41,6 +41,7 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
     near = point.cost < NEAR**2 * sum(int(s.counted.sum()) for s in segments)
     late = _delays(point, columns, channels) if near else {}
     noise: dict[str, ChannelNoise] = {}
+    loud = [s.loudness.copy() for s in segments]
     runs = point.shooting.simulated(point.plant, point.initial_states)
     deviations = [np.abs(s.measured - s.recorded(run)) for s, run in zip(segments, runs, strict=True)]
     spikes = [s.outliers.copy() for s in segments]
@@ -56,14 +57,22 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
         known = {f for i, c in where for f in segments[i].hum[c]}
         lines[channel] = tuple(known) or _lines([r[:, :-1].ravel() for r in cleaned], dt)
         quiet = [_without(r, lines[channel], segments[i]) for r, (i, _) in zip(cleaned, where, strict=True)]
-        noise[channel] = noise_model.estimate(quiet, dt)
+        # Its colour is that of all, each segment brought to the same strength.
+        even = noise_model.estimate(quiet, dt)
+        for (i, c), own in zip(where, noise_model.loudness(quiet, even), strict=True):
+            loud[i][:, c] = own
+        noise[channel] = noise_model.estimate(
+            [q / loud[i][:, c, None] for q, (i, c) in zip(quiet, where, strict=True)], dt
+        )
     parameters = point.parameters
     own = np.array([k in laws for k in parameters.keys], dtype=bool)
     shares = np.where(own, parameters.values / parameters.scales * LAW, 0.0)
     found = []
     for i, s in enumerate(segments):
         timing = tuple(replace(t, delay=late.get(c, t.delay)) for c, t in zip(s.channels, s.timing, strict=True))
-        judged = replace(s, outliers=spikes[i], timing=timing, hum=tuple(lines[c] for c in s.channels))
+        judged = replace(
+            s, loudness=loud[i], outliers=spikes[i], timing=timing, hum=tuple(lines[c] for c in s.channels)
+        )
         off = _raw_columns(s, columns[i], shares)
         hum = _hum(s, [lines[c] for c in s.channels], [noise[c].std for c in s.channels])
         judged = judged.with_noise([noise[c] for c in s.channels])

@@ -22,6 +22,7 @@ from .errors import SegmentError
 from .noise import noise_std, robust_noise_std, spikes, without
 from .noise_model import ChannelNoise
 from .recording import Timing
+from .saturation import runs
 from .velocity_filter import VelocityFilter
 
 MEASURED = ("position", "pressure_a", "pressure_b")
@@ -67,6 +68,8 @@ class Segments:
     outliers: Mask
     nuisance: Array
     disturbance: Array
+    loudness: Array
+    """(S, C) by how many times the noise of a channel is stronger in a segment than in all."""
 
     def __len__(self) -> int:
         return len(self.first)
@@ -80,6 +83,7 @@ class Segments:
             outliers=self.outliers[chosen],
             nuisance=self.nuisance[chosen],
             disturbance=self.disturbance[chosen],
+            loudness=self.loudness[chosen],
         )
 
     @property
@@ -124,7 +128,7 @@ class Segments:
             white = noise.whiten(own)
             for row, basis in self._missing[c]:
                 white[row] -= np.tensordot(basis, np.tensordot(basis, white[row], axes=(0, 0)), axes=(1, 0))
-            found.append(white)
+            found.append(white / self.loudness[:, c].reshape((-1,) + (1,) * (white.ndim - 1)))
         return np.stack(found, axis=2).reshape(len(values), -1, *values.shape[3:])
 
     def initial_states(self, plant: Plant) -> Array:
@@ -148,7 +152,9 @@ class Segments:
     def in_units(self, residual: Array) -> Array:
         """Whitened residuals (S, m) as deviations (S, samples, C) [SI], coloured as they were recorded."""
         white = self.by_channel(residual)
-        return np.stack([n.colour(white[:, :, c]) for c, n in enumerate(self.noise)], axis=-1)
+        return np.stack(
+            [n.colour(white[:, :, c] * self.loudness[:, c, None]) for c, n in enumerate(self.noise)], axis=-1
+        )
 
     @property
     def unmeasured_pressures(self) -> Mask:
@@ -171,25 +177,34 @@ def spread(segments: Sequence[Segments], most: int) -> list[Segments]:
     return [s.subset(np.arange(len(s)) % every == 0) for s in segments]
 
 
-def cut(records: Sequence[Record], kind: str, length: float, robust: bool = False) -> list[Segments]:
+def cut(
+    records: Sequence[Record],
+    kind: str,
+    length: float,
+    robust: bool = False,
+    left_out: Sequence[Mask] | None = None,
+) -> list[Segments]:
     """Cut records into equal segments of about ``length`` seconds; one as long as the record is a free run.
 
     :param kind: of the plant; only a hydraulic one has pressures
     :param robust: the noise must not follow outliers either
+    :param left_out: per record the samples (N,) that no segment may hold; segments then begin behind each of them
 
     :raises SegmentError: a record without drive or position, or too short; the message names it.
     """
-    return [_cut(record, kind == "hydraulic", length, robust) for record in records]
+    without_parts = [None] * len(records) if left_out is None else left_out
+    hydraulic = kind == "hydraulic"
+    return [_cut(r, hydraulic, length, robust, out) for r, out in zip(records, without_parts, strict=True)]
 
 
-def _cut(record: Record, hydraulic: bool, length: float, robust: bool) -> Segments:
+def _cut(record: Record, hydraulic: bool, length: float, robust: bool, left_out: Mask | None) -> Segments:
     for channel in ("drive", "position"):
         if channel not in record:
             raise SegmentError(f"{record.name}: no channel {channel!r}; a calibration needs drive and position")
     if not length > 0.0:
         raise SegmentError(f"segments of {length:g} s: the length must be positive")
     # Neighbours share one sample, as a run of n intervals has n + 1 of them.
-    settling = round(_SETTLING / record.dt) if record.duration > 10.0 * _SETTLING else 0
+    settling = unjudged(record)
     intervals = len(record) - 1 - settling
     number = max(1, round(intervals * record.dt / length))
     samples = intervals // number + 1
@@ -199,6 +214,14 @@ def _cut(record: Record, hydraulic: bool, length: float, robust: bool) -> Segmen
             f"are needed (the record has {len(record)})"
         )
     first: Index = settling + (samples - 1) * np.arange(number, dtype=np.int64)
+    if left_out is not None and left_out.any():
+        first, samples = _between(left_out, settling, samples)
+        if not first.size:
+            raise SegmentError(
+                f"{record.name}: no stretch of {_FEWEST} samples is left between those that are set aside (converters "
+                "at their end, rests against an unknown stop)"
+            )
+        number = len(first)
     channels = tuple(c for c in MEASURED if c in record and (hydraulic or c == "position"))
     alone = {c: spikes(record[c]) for c in channels}
     signals = {c: without(record[c], alone[c]) for c in channels}
@@ -212,8 +235,29 @@ def _cut(record: Record, hydraulic: bool, length: float, robust: bool) -> Segmen
         record, first, samples, channels, noise, measured, _smoothed(record, signals), free, prior_std,
         tuple(Timing() for _ in channels), tuple(() for _ in channels),
         np.stack([alone[c][index] for c in channels], axis=-1), np.zeros((number, samples * len(channels), 0)),
-        np.zeros((*measured.shape, 0)),
+        np.zeros((*measured.shape, 0)), np.ones((number, len(channels))),
     )  # fmt: skip
+
+
+def unjudged(record: Record) -> int:
+    """Samples at the beginning of a record in which states that no sensor sees are not known."""
+    return round(_SETTLING / record.dt) if record.duration > 10.0 * _SETTLING else 0
+
+
+def _between(left_out: Mask, settling: int, samples: int) -> tuple[Index, int]:
+    """First samples of segments in the stretches between samples that are left out, and how many samples each has.
+
+    Where no stretch is as long as a segment was meant to be, they are as short as the longest.
+    """
+    sound = ~left_out
+    sound[:settling] = False
+    stretches = runs(sound)
+    longest = max((b - a for a, b in stretches), default=0)
+    samples = min(samples, longest)
+    if samples < _FEWEST:
+        return np.zeros(0, dtype=np.int64), samples
+    found = [a + (samples - 1) * np.arange((b - a - 1) // (samples - 1), dtype=np.int64) for a, b in stretches]
+    return np.concatenate(found), samples
 
 
 def _noise(values: Array, robust: bool) -> float:

@@ -5,7 +5,9 @@ One finding, one function: `units`, `recording`, `experiment`, `travel`, `pressu
 """
 
 from .document import check, contradictions, rows, warnings
+from .experiment import resonance
 from .finding import CONTRADICTION, DOUBTFUL, NOT_IDENTIFIABLE, NOTE, Finding
+from .stops import other_stops
 
 __all__ = [
     "CONTRADICTION",
@@ -15,6 +17,8 @@ __all__ = [
     "Finding",
     "check",
     "contradictions",
+    "other_stops",
+    "resonance",
     "rows",
     "warnings",
 ]

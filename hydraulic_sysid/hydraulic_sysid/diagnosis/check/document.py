@@ -19,6 +19,7 @@ from .finding import CONTRADICTION, DOUBTFUL, NOT_IDENTIFIABLE, SEVERITIES, Find
 from .identifiability import not_identifiable
 from .observed import FEWEST_SAMPLES, Observed, Windows
 from .senses import senses
+from .stops import wrong_stops
 from .units import wrong_units
 
 SEGMENT = 0.5  # s, as fits have it
@@ -82,7 +83,8 @@ def contradictions(model: Model, records: Sequence[Record]) -> list[Finding]:
     units = wrong_units(every)
     if units:  # what follows from a channel of the wrong size says nothing new
         return merged(found + units)
-    found += experiment.standing(every) + travel.beyond_stroke(every)
+    travelled = travel.beyond_stroke(every) or wrong_stops(model, records, SEGMENT)
+    found += experiment.standing(every) + travelled
     signed = []
     for seen, signs in zip(every, senses(every), strict=True):
         found += [f for one in _OF_RECORDS for f in one(seen)] + signs

@@ -8,6 +8,7 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array, Mask
 from hydraulic_sysid.data.display import percent, quantity
+from hydraulic_sysid.estimation.saturation import at_end_of_range
 
 from .finding import CONTRADICTION, DOUBTFUL, NOT_IDENTIFIABLE, NOTE, Finding
 from .observed import MEASURED, Observed
@@ -35,21 +36,21 @@ def constant(seen: Observed) -> list[Finding]:
 
 
 def clipped(seen: Observed) -> list[Finding]:
-    """Sensors that sit at exactly their largest or smallest value for longer than their noise allows."""
+    """Sensors that sit at their largest or smallest value: too long for their noise, or with it cut off."""
     found = []
     for channel in MEASURED:
         if channel not in seen.signals:
             continue
-        values, share = seen.record[channel], 0.0
+        values = seen.record[channel]
+        at = at_end_of_range(values)
         for extreme in (float(values.max()), float(values.min())):
-            at = values == extreme
-            if _longest(at) > _allowed(values):
-                share += float(at.mean())
-                edge = extreme
-        if share:
-            unit = seen.record.unit(channel)
-            text = f"{channel} sits at exactly {quantity(edge, unit)} for {percent(share)} of the time."
-            remedy = "The converter is at its end: enlarge its range, or cut these parts off (--window)."
+            exactly = values == extreme
+            if _longest(exactly) > _allowed(values):
+                at = at | exactly
+        if at.any():
+            unit, edge = seen.record.unit(channel), float(np.median(values[at]))
+            text = f"{channel} sits at its end, {quantity(edge, unit)}, for {percent(float(at.mean()))} of the time."
+            remedy = "The converter is at its end: enlarge its range. A diagnosis sets these parts aside."
             found.append(Finding("clipped", channel, DOUBTFUL, text, remedy, edge, None, unit, seen.named))
     return found
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import quantity, span
 
@@ -13,7 +15,7 @@ from .finding import CONTRADICTION, DOUBTFUL, Finding
 from .observed import Observed
 
 _TIMES_NOISE = 6.0  # standard deviations by which the extremes of a record stand out
-_TOUCH = 0.005  # of the stroke: what stops give way and a displacement sensor bends
+TOUCH = 0.005  # of the stroke: what stops give way and a displacement sensor bends
 _SCALE = 0.03  # of the stroke: what the scale of a displacement sensor may be off (data sheets: 1 to 3 %)
 
 
@@ -23,12 +25,13 @@ def beyond_stroke(records: Sequence[Observed]) -> list[Finding]:
         return []
     plant = records[0].plant
     low, high = readings_at_stops(plant, records[0].record.dt)
-    ends = [(s.signals["position"], _TIMES_NOISE * s.noise["position"], s.record.name) for s in records]
+    touch = TOUCH * plant.value("stroke")
+    ends = [(*quiet(s, touch), s.record.name) for s in records]
     first, retracted = min((float(x.min()) + noise, name) for x, noise, name in ends)
     last, extended = max((float(x.max()) - noise, name) for x, noise, name in ends)
     stroke, names = plant.value("stroke"), tuple(dict.fromkeys((retracted, extended)))
     travel, off = last - first, max(last - high, low - first)
-    beyond, touch = max(travel - (high - low), off), _TOUCH * stroke
+    beyond = max(travel - (high - low), off)
     if beyond <= touch:
         return []
     severity = CONTRADICTION if beyond > _SCALE * stroke else DOUBTFUL
@@ -39,6 +42,16 @@ def beyond_stroke(records: Sequence[Observed]) -> list[Finding]:
     text = f"The position lies within {span(first, last, 'm')}; the model's stops are at {span(low, high, 'm')}."
     remedy = "Position 0 must be mid stroke: shift it (column map: offset), or correct stroke."
     return [Finding("zero", "position", severity, text, remedy, off, 0.0, "m", names)]
+
+
+def quiet(seen: Observed, touch: float) -> tuple[Array, float]:
+    """The position (N,) [m], averaged until its noise is small against ``touch`` [m] or over a window; and that noise.
+
+    Of many noisy samples the largest is far off what the piston did.
+    """
+    noise = _TIMES_NOISE * seen.noise["position"]
+    size = min(max(1, round((noise / (0.2 * touch)) ** 2)), seen.samples)
+    return np.asarray(uniform_filter1d(seen.signals["position"], size, mode="nearest")), noise / size**0.5
 
 
 def readings_at_stops(plant: Plant, dt: float) -> tuple[float, float]:

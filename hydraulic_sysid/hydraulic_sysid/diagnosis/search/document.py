@@ -122,6 +122,7 @@ def document(
                 }
                 for s in result.spikes
             ],
+            "set_aside": [vars(a) for a in result.split.set_aside],
             "mains_lines": {
                 c: sorted({f for s in result.split.segments if c in s.channels for f in s.hum[s.channels.index(c)]})
                 for c in result.split.channels

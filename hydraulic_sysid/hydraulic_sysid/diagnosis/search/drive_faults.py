@@ -94,7 +94,7 @@ def _bends(drive: Array, inside: Array) -> Disturbed:
 
 
 def _blocks(drive: Array, inside: Array) -> Disturbed:
-    std = robust_noise_std(drive)
+    std = robust_noise_std(drive, rounded=False)
     for block in np.array_split(inside, BLOCKS, axis=1):
         moved = drive.copy()
         moved[block] += std / block.shape[1] ** 0.5
@@ -108,6 +108,6 @@ BETWEEN_SAMPLES = DriveHypothesis(
 NOISY_DRIVE = DriveHypothesis(
     "drive_noise", "the recorded drive carries noise of {size} that the valve does not get",
     "record the command itself, or average its measurement over each sample", "V", True,
-    lambda s: robust_noise_std(s.record["drive"]), _blocks,
+    lambda s: robust_noise_std(s.record["drive"], rounded=False), _blocks,
 )  # fmt: skip
 DRIVE_HYPOTHESES: Sequence[DriveHypothesis] = (BETWEEN_SAMPLES, NOISY_DRIVE)

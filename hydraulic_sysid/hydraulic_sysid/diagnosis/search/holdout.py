@@ -8,18 +8,27 @@ long records blocks are left out, evenly, so that memory and time are bounded.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from hydraulic_sim.arrays import Index, Mask
+from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.estimation.segments import Segments, cut, spread
+from hydraulic_sysid.data.slower import slower
+from hydraulic_sysid.diagnosis.check import resonance
+from hydraulic_sysid.estimation.errors import SegmentError
+from hydraulic_sysid.estimation.segments import MEASURED, Segments, cut, spread
+
+from .set_aside import SetAside, set_aside
 
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
 MOST_VALUES = 240_000  # measured values of all segments: eighty seconds of three channels at 1 kHz
+DENSE = 500  # samples of a segment that do, if the model's resonance has …
+PER_PERIOD = 5.0  # … so many samples in a period
 
 
 @dataclass(frozen=True)
@@ -28,6 +37,8 @@ class Split:
 
     segments: list[Segments]
     fit: list[Mask]
+    set_aside: Sequence[SetAside] = ()
+    """What of the records is not judged at all."""
 
     @property
     def to_fit(self) -> list[Segments]:
@@ -45,7 +56,7 @@ class Split:
     def judged(self, segments: Sequence[Segments], usable: Sequence[Mask]) -> Split:
         """The same roles for segments of which more is known, without those that are not ``usable[i]`` (S_i,)."""
         kept = [s.subset(u) for s, u in zip(segments, usable, strict=True)]
-        return Split(kept, [f[u] for f, u in zip(self.fit, usable, strict=True)])
+        return replace(self, segments=kept, fit=[f[u] for f, u in zip(self.fit, usable, strict=True)])
 
     @property
     def channels(self) -> list[str]:
@@ -53,22 +64,58 @@ class Split:
         return list(dict.fromkeys(c for s in self.segments for c in s.channels))
 
 
-def split(records: Sequence[Record], validation: Sequence[Record], kind: str, length: float) -> Split:
-    """Cut ``records`` and those for ``validation`` into segments of ``length`` seconds.
+def split(records: Sequence[Record], validation: Sequence[Record], model: Model, length: float) -> Split:
+    """Cut ``records`` and those for ``validation`` into segments of ``length`` seconds, what is `set_aside` left out.
+
+    Records with more values than are used are taken at a lower rate, as far as the model's resonance allows.
 
     :raises hydraulic_sysid.estimation.errors.SegmentError: a record cannot be cut.
     """
-    segments = _thinned(cut(records, kind, length) + cut(validation, kind, length))
+    every = [*records, *validation]
+    for record in every:
+        record.require("drive", "position", error=SegmentError)
+    masks, aside = set_aside(model, every, length)
+    factors = _factors(model, every, masks, length)
+    slow = [slower(r, k) for r, k in zip(every, factors, strict=True)]
+    masks = [_reduced(m, k, len(r)) for m, k, r in zip(masks, factors, slow, strict=True)]
+    cuts = cut(slow, model.kind, length, left_out=masks)
+    segments, used = _thinned(cuts)
     if validation:
-        return Split(segments, [np.full(len(s), i < len(records)) for i, s in enumerate(segments)])
+        return Split(segments, [np.full(len(s), i < len(records)) for s, i in zip(segments, used, strict=True)], aside)
     # Shifted from record to record, so that not always the same phase of an experiment is for validation.
-    return Split(segments, [_alternate(np.arange(len(s)), i) for i, s in enumerate(segments)])
+    return Split(segments, [_alternate(np.arange(len(s)), i) for s, i in zip(segments, used, strict=True)], aside)
 
 
-def _thinned(segments: list[Segments]) -> list[Segments]:
-    """One block in so many of each, where there are more than `MOST_VALUES`."""
+def _factors(model: Model, records: Sequence[Record], left_out: Sequence[Mask], length: float) -> list[int]:
+    """By how much each record is slowed down: as its values ask for, and its segments and the oil allow."""
+    values = [int((~m).sum()) * sum(c in r for c in MEASURED) for m, r in zip(left_out, records, strict=True)]
+    wanted = int(sum(values) / MOST_VALUES)
+    if wanted <= 1:
+        return [1] * len(records)
+    slowest = max(DENSE / length, PER_PERIOD * (resonance(model) or 0.0))
+    return [max(1, min(wanted, int(1.0 / (slowest * r.dt) + 1e-6))) for r in records]
+
+
+def _reduced(left_out: Mask, factor: int, count: int) -> Mask:
+    """Of the samples that are kept: those whose smoothing saw one that is left out."""
+    if factor <= 1:
+        return left_out
+    return np.asarray(maximum_filter1d(left_out, 3 * factor)[: count * factor : factor])
+
+
+def _thinned(segments: list[Segments]) -> tuple[list[Segments], list[int]]:
+    """One block in so many of all records, where there are more than `MOST_VALUES`; and of which records they are."""
     every = ceil(sum(s.measured.size for s in segments) / MOST_VALUES)
-    return [s.subset(np.arange(len(s)) // BLOCK % every == 0) for s in segments] if every > 1 else segments
+    kept, used, before = [], [], 0
+    for i, s in enumerate(segments):
+        # Blocks are counted on from record to record, so that not the first one of each is kept.
+        block = before + np.arange(len(s)) // BLOCK
+        before = int(block[-1]) + 1
+        chosen = block % every == 0
+        if chosen.any():
+            kept.append(s.subset(chosen) if every > 1 else s)
+            used.append(i)
+    return kept, used
 
 
 def _alternate(number: Index, shift: int) -> Mask:

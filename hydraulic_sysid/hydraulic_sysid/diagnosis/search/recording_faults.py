@@ -7,6 +7,7 @@ free parameters follow to first order (variable projection); nothing else is sim
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +38,11 @@ class Hypothesis:
     text: str
     remedy: str
     unit: str = "s"
+
+    def shown_by(self, channels: AbstractSet[str]) -> bool:
+        """Whether records with these channels in all show it: no other hypothesis says the same of them."""
+        seen = channels & set(self.channels)
+        return len(seen) == len(self.channels) or (len(seen) > 1 and "position" in seen)
 
     def applied(self, segments: Segments, size: float) -> Segments:
         """Segments whose record is taken to have a fault of this ``size`` [s]."""
@@ -116,18 +122,22 @@ def recording_faults(at: Linearisation) -> list[RecordingFault]:
     runs = point.shooting.simulated(point.plant, point.initial_states)
     before = _cost(part, [p.raw for p in point.projections])
     found = []
+    # Of one pressure in each record, A or B, both together may be late just as well.
+    channels = {c for s in point.shooting.segments for c in s.channels}
     for hypothesis in HYPOTHESES:
-        if not any(set(hypothesis.channels) <= set(s.channels) for s in point.shooting.segments):
+        if not hypothesis.shown_by(channels):
             continue
         fault = _best(part, runs, hypothesis, before, share)
         found += [fault] if fault is not None else []
     if not any(s.disturbance.shape[-1] for s in point.shooting.segments):
         for one in DRIVE_HYPOTHESES:
+            size = float(np.median([one.size(s) for s in at.split.segments]))
+            if not size > 0.0:
+                continue
             responses = one.responses(part)
             lower = before - _cost_disturbed(part, responses)
             if one.exact and lower < before - _cost_disturbed(part, [0.5 * r for r in responses]):
                 continue  # disturbances of that size would show more than there is
-            size = float(np.median([one.size(s) for s in at.split.segments]))
             found += [RecordingFault(one, size, 0.0, lower / share)] if lower > 0.0 else []
     return sorted(found, key=lambda f: -f.reduction)
 

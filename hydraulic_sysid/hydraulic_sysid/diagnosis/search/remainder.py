@@ -48,8 +48,8 @@ def remainders(split: Split, residual: Sequence[Array]) -> list[Remainder]:
         moved = segments.measured - segments.measured.mean(axis=1, keepdims=True)
         for c, channel in enumerate(segments.channels):
             kept = ~segments.outliers[:, :, c]
-            noise = float(segments.noise_std[c])
-            sums = [np.sum(left[..., c][kept] ** 2), noise**2 * kept.sum(), np.sum(moved[..., c][kept] ** 2)]
+            noise = float(segments.noise_std[c]) * segments.loudness[:, c]
+            sums = [np.sum(left[..., c][kept] ** 2), noise**2 @ kept.sum(axis=1), np.sum(moved[..., c][kept] ** 2)]
             squares[channel] += sums
             count[channel] += int(kept.sum())
     found = []

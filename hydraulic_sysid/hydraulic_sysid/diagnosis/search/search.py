@@ -174,7 +174,7 @@ class Search:
             raise DiagnosisError("there is no record to diagnose")
         model = bounded(model)
         try:
-            return cls(model, split(records, validation, model.kind, settings.length), settings, say)
+            return cls(model, split(records, validation, model, settings.length), settings, say)
         except SegmentError as error:
             raise DiagnosisError(str(error)) from None
 

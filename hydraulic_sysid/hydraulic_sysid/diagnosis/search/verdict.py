@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity
 from hydraulic_sysid.data.records import Record
@@ -16,6 +18,7 @@ from .drive_faults import DriveHypothesis
 from .nonparametric_curves import NonparametricCurve
 from .remainder import Remainder, negligible
 from .search import SearchResult
+from .set_aside import SATURATED, SetAside
 from .whiteness import Whiteness
 
 MISSING = "missing"
@@ -132,7 +135,8 @@ def kind_of(result: SearchResult, tied: bool) -> str:
 
 def faulty(result: SearchResult) -> bool:
     """Whether the recording, not the physics, is at fault."""
-    return bool(result.faults) or any(s.share > MANY_SPIKES for s in result.spikes)
+    saturated = any(a.reason == SATURATED for a in result.split.set_aside)
+    return saturated or bool(result.faults) or any(s.share > MANY_SPIKES for s in result.spikes)
 
 
 def drive_unknown(result: SearchResult) -> bool:
@@ -160,18 +164,19 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     """What a user reads first."""
     base, final = result.base.misfit.rms_validation, result.final.misfit.rms_validation
     left = " ".join([remainder_sentence(result.remainders), *noise_sentences(result)])
+    aside = set_aside_sentences(result.split.set_aside)
     fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
     if verdict.kind == COMPLETE:
         return (
             f"Complete: on validation data the residual is {final:.3g} × noise, and no effect of the library lowers it "
-            f"by more than chance. {left}"
+            f"by more than chance. {' '.join([left, *aside])}"
         )
     if verdict.kind == RECORDING:
-        found = [*recording_sentences(result), *data_sheet_sentences(result)]
+        found = [*recording_sentences(result), *aside, *data_sheet_sentences(result)]
         return " ".join(["Recording:", *found, fell, left, UNCERTAIN if drive_unknown(result) else NO_EFFECT])
     if verdict.kind == DATA_SHEET:
-        return " ".join(["Data sheet:", *data_sheet_sentences(result), fell, left, NO_EFFECT])
-    beside = [*data_sheet_sentences(result), *recording_sentences(result)]
+        return " ".join(["Data sheet:", *data_sheet_sentences(result), *aside, fell, left, NO_EFFECT])
+    beside = [*data_sheet_sentences(result), *recording_sentences(result), *aside]
     if verdict.kind == MISSING:
         return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict), *beside])
     if verdict.kind == INDISTINGUISHABLE:
@@ -190,7 +195,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         best = curves[0]
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
         text += f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
-    return text.strip()
+    return " ".join([text.strip(), *aside])
 
 
 def remainder_sentence(found: Sequence[Remainder]) -> str:
@@ -245,6 +250,37 @@ def recording_sentences(result: SearchResult) -> list[str]:
             f"of {name}; they are left out: look for a loose contact or a bad converter."
         )
     return found
+
+
+def set_aside_sentences(found: Sequence[SetAside]) -> list[str]:
+    """What of the records is not judged, why, and what to mend; one sentence per channel, reason and end."""
+    groups: dict[tuple[str, str, bool], list[SetAside]] = {}
+    for one in found:
+        groups.setdefault((one.channel, one.reason, one.reading > 0.0), []).append(one)
+    said = []
+    for (channel, reason, _), every in groups.items():
+        at = quantity(float(np.median([a.reading for a in every])), UNITS[channel], 4)
+        time = quantity(sum(a.seconds for a in every), "s", 3)
+        if reason == SATURATED:
+            said.append(
+                f"{_first_upper(TITLES[channel])} is clipped at {at}: its converter is at its end for {time} of "
+                f"{_count(every)}. These parts are set aside: enlarge the range."
+            )
+        else:
+            said.append(
+                f"The piston rests against a stop at {at} for {time} of {_count(every)}, and the model has none there. "
+                "These parts are set aside: shift position 0 to mid stroke (column map: offset), or correct stroke."
+            )
+    return said
+
+
+def _first_upper(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _count(found: Sequence[SetAside]) -> str:
+    number = len({a.record for a in found})
+    return found[0].record if number == 1 else f"{number} records"
 
 
 def imitated(records: Sequence[Record]) -> list[str]:
