@@ -23,9 +23,9 @@ def fastest(effects: Iterable[Effect], values: Mapping[str, float], kind: str) -
     return rate
 
 
-def step(rate: float, longest: float) -> float:
-    """The longest step [s] that follows a rate [1/s]."""
-    return min(longest, STEP_TIMES_RATE / rate) if rate > 0.0 else longest
+def step(rate: float, longest: float, refinement: float = 1.0) -> float:
+    """The longest step [s] that follows a rate [1/s]; a ``refinement`` below 1 shortens it."""
+    return min(longest, refinement * STEP_TIMES_RATE / rate) if rate > 0.0 else longest
 
 
 def shortest_sampling(effects: Iterable[Effect], values: Mapping[str, float]) -> float:

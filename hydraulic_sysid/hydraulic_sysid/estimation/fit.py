@@ -28,6 +28,8 @@ from .shooting import Shooting
 _SETTLED = 1e-4  # share of the cost below which moving initial states on gains no more
 _ROUNDS = 4  # times that they are moved at most
 _NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured pressures go further
+_TURNED = 0.8  # of the sum of squares where the directions of the initial states were taken: below, they are taken anew
+_TURNED_AT_LAST = 0.9999  # the same where a fit would end
 _MILD = 3.0  # residual over noise from which a robust loss counts less than the square
 
 
@@ -48,13 +50,17 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class FitPoint:
-    """Parameters and initial states of a fit, and what is left there. Nothing of it changes: a step gives another."""
+    """Parameters and initial states of a fit, and what is left there. Nothing of it changes: a step gives another.
+
+    ``turned``: sum of squares where the directions in which initial states act were taken.
+    """
 
     shooting: Shooting
     parameters: Parameters
     initial_states: list[Array]
     projections: list[Projection]
     robust: bool = False
+    turned: float = 0.0
 
     @classmethod
     def begin(
@@ -65,13 +71,13 @@ class FitPoint:
         robust: bool = False,
         priors: Priors = NO_PRIORS,
     ) -> FitPoint:
-        """A model as it is, initial states moved once to where they fit best."""
+        """A model as it is, initial states moved once to where they fit best, from other starts where stuck."""
         shooting = Shooting(plant, segments)
         point = cls(shooting, Parameters.of(plant.model, keys, priors), shooting.initial_states, [], robust)
         if any(s.unmeasured_pressures.any() for s in segments):
             raw = shooting.residuals(point.plant, shooting.initial_states)
             shooting = replace(shooting, misfit=_misfit(segments, raw))
-        return point.settled(shooting, point.parameters)
+        return point.settled(shooting, point.parameters).freed()
 
     @property
     def plant(self) -> Plant:
@@ -115,19 +121,35 @@ class FitPoint:
         """
         plant = shooting.plant.with_parameters(parameters.by_key)
         states = shooting.settled(plant, self.initial_states if initial_states is None else initial_states)
-        return FitPoint(shooting, parameters, *states, self.robust)
+        point = FitPoint(shooting, parameters, *states, self.robust)
+        return replace(point, turned=point.cost)
 
     def moved(self, change: Array) -> FitPoint | None:
         """A change (P,) of the parameters away; None where the plant does not run there.
 
-        Initial states begin where they will fit best, to first order.
+        Initial states begin where they will fit best, to first order; the directions in which they act are kept.
         """
         ahead = [p.raw + c @ change for p, c in zip(self.projections, self.columns, strict=True)]
         states = self.shooting.corrected(self.initial_states, self.projections, ahead)
+        parameters = self.parameters.moved(change)
+        plant = self.shooting.plant.with_parameters(parameters.by_key)
         try:
-            return self.settled(self.shooting, self.parameters.moved(change), states)
+            initial_states, projections = self.shooting.settled(plant, states, self.projections)
         except SimulationError:
             return None
+        return replace(self, parameters=parameters, initial_states=initial_states, projections=projections)
+
+    def freed(self) -> FitPoint:
+        """The same parameters, with other starts of segments that are stuck."""
+        states, projections = self.shooting.freed(self.plant, self.initial_states, self.projections)
+        return replace(self, initial_states=states, projections=projections)
+
+    def turned_anew(self, least: float) -> FitPoint:
+        """This point, its directions of the initial states taken anew where they are old.
+
+        :param least: of the sum of squares where they were taken, below which they are
+        """
+        return self.settled(self.shooting, self.parameters) if self.cost < least * self.turned else self
 
     def reweighted(self) -> FitPoint:
         """This point, or the same parameters with unmeasured pressures freer, where the model comes nearer."""
@@ -142,7 +164,8 @@ class FitPoint:
         for _ in range(_ROUNDS):
             again = point.reweighted()
             if again is point:
-                again = point.settled(point.shooting, point.parameters)
+                states = point.shooting.improved(point.plant, point.initial_states, point.projections)
+                again = replace(point, initial_states=states[0], projections=states[1])
                 if not again.cost < point.cost:
                     break
                 if point.cost - again.cost < _SETTLED * point.cost:
@@ -214,7 +237,7 @@ def fit(
     settings = settings or FitSettings()
     if not records:
         raise CalibrationError("there is no record to calibrate on")
-    plant = Plant(model)
+    plant = Plant.for_fits(model)
     return fit_segments(plant, cut(records, model.kind, settings.length, settings.robust), keys, settings, progress)
 
 
@@ -231,15 +254,21 @@ def fit_segments(
     def accepted(number: int, point: FitPoint) -> FitPoint:
         if progress is not None:
             progress(number, float(np.sqrt(point.cost / max(sum(p.raw.size for p in point.projections), 1))))
-        return point.reweighted()
+        again = point.reweighted()
+        return again if again is not point else point.turned_anew(_TURNED)
 
     begin = FitPoint.begin(plant, segments, keys, settings.robust, priors)
     if not keys:
         return Fit(begin.at_rest(), True, 0)
-    found: Minimum[FitPoint] = minimise(
-        begin, settings.most_steps, settings.least_gain, settings.tolerance, accepted=accepted
-    )
-    return Fit(found.point, found.converged, found.iterations)
+    steps = 0
+    while True:
+        found: Minimum[FitPoint] = minimise(
+            begin, settings.most_steps - steps, settings.least_gain, settings.tolerance, accepted=accepted
+        )
+        steps += found.iterations
+        begin = found.point.turned_anew(_TURNED_AT_LAST)
+        if begin is found.point or steps >= settings.most_steps:
+            return Fit(found.point, found.converged, steps)
 
 
 def evaluate(model: Model, records: Sequence[Record], settings: FitSettings | None = None) -> Fit:

@@ -14,6 +14,6 @@ def jit(function: Callable[..., Any]) -> Callable[..., Any]:
     For functions that call no compiled function of another file: the cache would not see that one change.
     """
     try:
-        return njit(cache=True)(function)
+        return njit(cache=True, nogil=True)(function)
     except RuntimeError:  # numba finds no folder for its cache
-        return njit(function)
+        return njit(nogil=True)(function)

@@ -16,12 +16,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_toeplitz, solve_triangular, toeplitz
+from scipy.linalg import hankel, solve_toeplitz, solve_triangular, toeplitz
 from scipy.ndimage import median_filter
-from scipy.signal import lfilter, lfiltic, welch
+from scipy.signal import lfilter, welch
 from scipy.stats import gamma
 
 from hydraulic_sim.arrays import Array, Mask
+
+from .jit import jit
 
 ORDER = 12  # of the autoregression: two second-order filters and what hum and rounding add
 WINDOW = 128  # samples of a periodogram
@@ -73,10 +75,9 @@ class ChannelNoise:
         """(S, n, …) along the second axis, n > p: unit variance and no colour where ``values`` are this noise."""
         if not self.order:
             return values / self.innovation
-        white = values.copy()
-        for lag, coefficient in enumerate(self.coefficients[1:].tolist(), 1):
-            white[:, lag:] += coefficient * values[:, :-lag]
-        white /= self.innovation
+        width = int(np.prod(values.shape[2:]))
+        rows = np.ascontiguousarray(values, dtype=float).reshape(len(values), -1)
+        white = _moving_average(rows, width, self.coefficients / self.innovation).reshape(values.shape)
         head = np.moveaxis(values[:, : self.order], 1, 0)
         first = solve_triangular(self._root, head.reshape(self.order, -1), lower=True)
         white[:, : self.order] = np.moveaxis(first.reshape(head.shape), 0, 1)
@@ -100,9 +101,20 @@ class ChannelNoise:
         values = np.empty_like(white)
         p = self.order
         values[:, :p] = white[:, :p] @ self._root.T
-        begin = np.stack([lfiltic([self.innovation], self.coefficients, row[p - 1 :: -1]) for row in values[:, :p]])
+        begin = -values[:, p - 1 :: -1][:, :p] @ hankel(self.coefficients[1:])  # what the filter remembers
         values[:, p:], _ = lfilter([self.innovation], self.coefficients, white[:, p:], axis=1, zi=begin)
         return values
+
+
+@jit
+def _moving_average(values: Array, width: int, coefficients: Array) -> Array:
+    """Σ_l c_l·x_{t−l} of values (S, n·width), n samples side by side; what is before the first is 0."""
+    found = coefficients[0] * values
+    for s in range(values.shape[0]):
+        for lag in range(1, coefficients.size):
+            for i in range(lag * width, values.shape[1]):
+                found[s, i] += coefficients[lag] * values[s, i - lag * width]
+    return found
 
 
 def estimate(residuals: Sequence[Array], dt: float, order: int = ORDER) -> ChannelNoise:

@@ -6,7 +6,7 @@ of a fit: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413–432; Kaufman, BI
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -65,6 +65,13 @@ class Projection:
     def with_raw(self, raw: Array) -> Projection:
         """Other residuals (S, m), the same directions."""
         return replace(self, raw=raw)
+
+    def with_segments(self, chosen: Mask, other: Projection) -> Projection:
+        """The ``chosen`` (S,) segments replaced by those of another."""
+        found = {f.name: getattr(self, f.name).copy() for f in fields(self)}
+        for name, values in found.items():
+            values[chosen] = getattr(other, name)
+        return Projection(**found)
 
     def subset(self, chosen: Mask) -> Projection:
         """Of the ``chosen`` (S,) segments alone."""

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array
+from hydraulic_sim.arrays import Array, Mask
 from hydraulic_sim.plant import Plant
 
 from .parameters import Parameters
@@ -26,6 +26,9 @@ _LEAST_STEP = 0.1  # … or of so much of its scale
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel
 _VELOCITY_STEP = 1e-3  # m/s
 _PRESSURE_STEP = 1e5  # Pa, where the pressure is not measured
+_AT_REST = 2e-3  # m/s, below which dry friction may hold the piston with any part of its force, …
+_HOLDING = (-0.9, -0.5, 0.0, 0.5, 0.9)  # … of which these are tried
+_STUCK = 1.5  # mean square of a segment, of the median, from which its start is sought anew
 
 
 @dataclass(frozen=True)
@@ -74,13 +77,24 @@ class Shooting:
         """Eliminate the initial states around those given."""
         return self._map(lambda i: self._projection(plant, i, initial_states[i]), range(len(self.segments)))
 
-    def settled(self, plant: Plant, initial_states: Sequence[Array]) -> tuple[list[Array], list[Projection]]:
+    def settled(
+        self, plant: Plant, initial_states: Sequence[Array], directions: Sequence[Projection] = ()
+    ) -> tuple[list[Array], list[Projection]]:
         """Initial states where the residual is smallest, to first order, and what is left there.
 
-        The directions in which they act are those before the move; they hardly change with it. An initial state that
-        the move makes worse stays where it was.
+        The ``directions`` in which they act, by default those before the move, hardly change with it. An initial state
+        that the move makes worse stays where it was.
         """
-        before = self.projections(plant, initial_states)
+        if directions:
+            before = [p.with_raw(r) for p, r in zip(directions, self.residuals(plant, initial_states), strict=True)]
+        else:
+            before = self.projections(plant, initial_states)
+        return self.improved(plant, initial_states, before)
+
+    def improved(
+        self, plant: Plant, initial_states: Sequence[Array], before: Sequence[Projection]
+    ) -> tuple[list[Array], list[Projection]]:
+        """As `settled`, from residuals and directions that are known."""
         moved = self.corrected(initial_states, before, [p.raw for p in before])
         states, projections = [], []
         for old, new, raw, p in zip(initial_states, moved, self.residuals(plant, moved), before, strict=True):
@@ -88,6 +102,40 @@ class Shooting:
             states.append(np.where(better, new, old))
             projections.append(p.with_raw(np.where(better, raw, p.raw)))
         return states, projections
+
+    def freed(
+        self, plant: Plant, initial_states: Sequence[Array], projections: Sequence[Projection]
+    ) -> tuple[list[Array], list[Projection]]:
+        """Initial states and what is left there, with another start where one is stuck.
+
+        Which part of dry friction holds a piston at rest shows in no sensor; a segment that begins with a wrong one
+        rings. Those that begin at rest, and leave clearly more than most, are started from several.
+        """
+        costs = [np.sum(p.residual**2, axis=1) / s.counted for p, s in zip(projections, self.segments, strict=True)]
+        limit = _STUCK * float(np.median(np.concatenate(costs)))
+        done = [
+            self._freed(plant, i, states, p, (cost > limit) & (np.abs(self.initial_states[i][:, 1]) < _AT_REST))
+            for i, (states, p, cost) in enumerate(zip(initial_states, projections, costs, strict=True))
+        ]
+        return [states for states, _ in done], [p for _, p in done]
+
+    def _freed(
+        self, plant: Plant, i: int, states: Array, projection: Projection, stuck: Mask
+    ) -> tuple[Array, Projection]:
+        if not stuck.any() or not plant.has_dry_friction:
+            return states, projection
+        part = Shooting(plant, [self.segments[i].subset(stuck)], self.misfit)
+        best, left = states[stuck], projection.subset(stuck)
+        for holding in _HOLDING:
+            begin = part.initial_states[0].copy()
+            begin[:, plant.state_names.index("stick")] = holding
+            begin[:, 1] = 0.0
+            (tried,), (other,) = part.settled(plant, [begin])
+            better = np.sum(other.residual**2, axis=1) < np.sum(left.residual**2, axis=1)
+            best, left = np.where(better[:, None], tried, best), left.with_segments(better, other.subset(better))
+        freed = states.copy()
+        freed[stuck] = best
+        return freed, projection.with_segments(stuck, left)
 
     def corrected(
         self, initial_states: Sequence[Array], projections: Sequence[Projection], residuals: Sequence[Array]

@@ -50,7 +50,7 @@ def not_identifiable(
         return []
     try:
         segments = cut(records, model.kind, length)
-        point = FitPoint.begin(Plant(model), spread(segments, _MOST), keys)
+        point = FitPoint.begin(Plant.for_fits(model), spread(segments, _MOST), keys)
         share = sum(map(len, point.shooting.segments)) / sum(map(len, segments))
         known = attainable(with_laws_off(point), point.columns, share)
         same = attainable(point, point.columns, share).correlation

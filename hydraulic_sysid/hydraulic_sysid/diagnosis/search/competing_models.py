@@ -53,7 +53,7 @@ def _collinearity(at: Linearisation, one: Model | None, other: Model) -> float:
     if one is None:
         return float("nan")
     try:
-        columns = at.changes([Plant(m).with_parameters(at.parameters.by_key) for m in (one, other)])
+        columns = at.changes([Plant.for_fits(m).with_parameters(at.parameters.by_key) for m in (one, other)])
     except SimulationError:
         return float("nan")
     information = at.bordered(columns).marginal(len(at.parameters)).information

@@ -56,7 +56,7 @@ def refit(at: Linearisation, model: Model, start: Mapping[str, float]) -> Refit:
 def as_it_is(at: Linearisation, model: Model) -> Refit:
     """``model``, which has the linearisation's effects and more, with the values it has."""
     none = Parameters.of(model, ())
-    point = FrozenPoint.at(at, Plant(model), none, at.point.initial_states)
+    point = FrozenPoint.at(at, Plant.for_fits(model), none, at.point.initial_states)
     if point is None:
         return Refit(model, at.costs, at.residual)
     rested = point.at_rest(_ROUNDED)
@@ -65,7 +65,7 @@ def as_it_is(at: Linearisation, model: Model) -> Refit:
 
 def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Sequence[str]) -> FrozenPoint | None:
     """Where to start: as far towards the prediction as lowers the sum of squares."""
-    plant = Plant(model).with_parameters(dict(start))
+    plant = Plant.for_fits(model).with_parameters(dict(start))
     predicted = Parameters.of(model, own)
     values = np.array([start[k] for k in own])
     predicted = replace(predicted, values=np.clip(values, predicted.low, predicted.high))

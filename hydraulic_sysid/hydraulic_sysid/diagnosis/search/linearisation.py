@@ -35,7 +35,7 @@ class Linearisation:
     @classmethod
     def of(cls, model: Model, split: Split, priors: Priors = NO_PRIORS) -> Linearisation:
         """Of a model that was fitted before."""
-        point = FitPoint.begin(Plant(model), split.segments, model.movable_keys(), priors=priors).at_rest()
+        point = FitPoint.begin(Plant.for_fits(model), split.segments, model.movable_keys(), priors=priors).at_rest()
         return cls(model, split, point, point.columns, point.beyond(point.columns))
 
     @property

@@ -46,7 +46,7 @@ def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures
 
 
 def _score(at: Linearisation, effect: Effect, features: RecordFeatures) -> CandidateScore | None:
-    plant = Plant(at.model.with_effect(effect.name))
+    plant = Plant.for_fits(at.model.with_effect(effect.name))
     for sizes in (SIZES, LARGE):
         found = [_predict(at, plant, effect, group) for group in probes(effect, features, sizes)]
         usable = [f for f in found if f is not None]

@@ -193,11 +193,14 @@ class Search:
 
     def judged(self, state: SearchState) -> SearchState:
         """A state, judged by the noise that it shows itself."""
-        for _ in range(ROUNDS):
+        for number in range(ROUNDS):
             self.say("noise of the records")
-            at = state.linearisation
+            at, before = state.linearisation, self.split
             segments = refined(at.point, at.columns, self._laws(state.model))
-            self.split = self.split.judged(segments, usable(at.costs))
+            after = before.judged(segments, usable(at.costs))
+            if number and not quieter(before, after) and not retimed(before, after):
+                break
+            self.split = after
             state = self.state(state.model, self._last if state.misfit.variance < FAR_OFF else self._first)
         return state
 
@@ -309,7 +312,7 @@ class Search:
             smooth = smooth.without_effect(name)
         segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
         done = fit_segments(
-            Plant(smooth), segments, smooth.movable_keys(), settings or self.settings, priors=self.priors
+            Plant.for_fits(smooth), segments, smooth.movable_keys(), settings or self.settings, priors=self.priors
         )
         at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors)
         if not seen:
