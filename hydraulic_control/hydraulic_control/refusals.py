@@ -9,6 +9,7 @@ class Refusal(Enum):
     NOT_FINITE = "state: position or velocity is not a number"
     OUT_OF_ORDER = "state: stamp does not advance"
     STALE = "state: older than the limit"
+    FUTURE = "state: further in the future than the limit"
     SILENT = "state: none came for longer than the limit"
     IMPLAUSIBLE = "state: position leaps further than the actuator can move"
     BAD_REFERENCE = "reference: not a number, or outside the travel"

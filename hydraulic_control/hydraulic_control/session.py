@@ -21,11 +21,11 @@ _REMEMBERED = 20  # commands, within which an obedient plant has applied one
 class ControlSession:
     """Holds the controller, the references and the times; stamps are ns of the plant's clock.
 
-    ``age_limit`` [s]: a state older than this, or silence for as long, gives 0 V. ``speed_limit`` [m/s]: a position
-    that leaps faster is not believed, unless the next one confirms it. ``applied_tolerance`` [V]: a plant whose applied
-    drive is further from every recent command does not obey. Where it applies a part of them, it limits: the controller
-    joins on to the applied drive, so that nothing winds up. Else (disabled, stopped, another source) the reference is
-    dropped too, and the position found is held.
+    ``age_limit`` [s]: a state older than this, or as far in the future, or silence for as long, gives 0 V.
+    ``speed_limit`` [m/s]: a position that leaps faster is not believed, unless the next one confirms it.
+    ``applied_tolerance`` [V]: a plant whose applied drive is further from every recent command does not obey. Where it
+    applies a part of them, it limits: the controller joins on to the applied drive, so that nothing winds up. Else
+    (disabled, stopped, another source) the reference is dropped too, and the position found is held.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -78,6 +78,8 @@ class ControlSession:
             self._refuse(Refusal.OUT_OF_ORDER, "")
             return None
         age = (now_ns - stamp) * 1e-9
+        if age < -self.age_limit:
+            return self._rest(Refusal.FUTURE, f"{-age:.3f} s, allowed are {self.age_limit:g} s")
         if age > self.age_limit:
             self._stamp_ns = stamp
             return self._rest(Refusal.STALE, f"{age:.3f} s, allowed are {self.age_limit:g} s")

@@ -64,7 +64,7 @@ def millivolts(state: Any) -> float:
 
 def test_names_types_and_qos(start: Any, client: Any, wait_until: Any) -> None:
     start(autostart=False)
-    client.state()
+    assert client.change_state("configure"), "who publishes `state` is the plant, which it is once it is configured"
     for row in TOPICS:
         if row.publisher != "plant" and row.name != "command":
             continue

@@ -87,6 +87,19 @@ def test_bad_references_are_not_followed(reference: Reference, refusal: Refusal)
     assert loop.reference is not None and loop.reference.position == 0.02
 
 
+def test_a_state_from_the_future_gives_0_V_and_locks_nobody_out() -> None:
+    loop = session()
+    feed(loop, 10)
+    assert follow(loop, 9, 0.02)
+    assert feed(loop, 200, first=10)[-1] == pytest.approx(2.0, rel=0.02)
+    assert feed(loop, 1, first=710, age=-0.5) == [0.0]
+    assert loop.refusals[Refusal.FUTURE] == 1 and "0.500 s" in loop.trouble
+    again = feed(loop, 600, first=210)
+    assert None not in again, "the states of the plant itself are answered as before"
+    assert again[-1] == pytest.approx(2.0, rel=0.05)
+    assert loop.refusals[Refusal.OUT_OF_ORDER] == 0
+
+
 def test_a_stale_state_gives_0_V_and_says_so() -> None:
     loop = session()
     feed(loop, 10)

@@ -220,8 +220,41 @@ def test_two_publishers_of_one_name_and_a_longer_watchdog(start: Any, client: An
     assert {state.effort[1] for state in states} <= {0.0, 4.0}
     assert health["command level"] == "1" and health["second_publisher_of"] == "controller"
     assert process.output().count("a second publisher commands as 'controller' and is refused") == 1
+
+    from rclpy.qos import QoSProfile, ReliabilityPolicy
+    from sensor_msgs.msg import JointState
+
+    unheard = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    client.node.create_publisher(JointState, "/actuator/command", unheard)
+    wait_until(lambda: "/test/test_client" in health["not_heard"], "a publisher that is not heard")
+    process.says("commands are not heard, their QoS does not match: /test/test_client (ERROR: Best effort publisher")
     refused = set_parameter(client, "watchdog", 5.0)
     assert not refused.successful and "read when the node is configured" in refused.reason
+
+
+def test_one_plant_per_name(start: Any, client: Any, wait_until: Any, journal: Path) -> None:
+    """A second one is not configured; a publisher of its state that is there all the same stops the first."""
+    first = start()
+    states, health = client.collect("state"), client.diagnostics()
+    client.source("hand", 1.0)
+    wait_until(lambda: client.state() == "active", "an active plant")
+    assert enable(client).success
+    wait_until(lambda: states and states[-1].effort[1] == 1.0, "the commanded drive")
+    second = start()
+    second.says("cannot configure: another process is /actuator/plant in domain")
+    assert journal.read_text().split().count("configure") == 1, "the second has not touched its plant"
+    assert states[-1].effort[1] == 1.0 and "another plant" not in first.output()
+    second.end()
+    impostor = client.publisher("state")
+    wait_until(lambda: states[-1].effort[1] == 0.0, "0 V")
+    wait_until(lambda: "another plant: /test/test_client" in health["stop_reason"], "the reason in the diagnostics")
+    assert health["plant level"] == "2" and "enabled False" in journal.read_text().splitlines()
+    answer = client.call("std_srvs/srv/Trigger", "/actuator/reset")
+    assert not answer.success and "/test/test_client" in answer.message
+    client.node.destroy_publisher(impostor)
+    wait_until(lambda: client.call("std_srvs/srv/Trigger", "/actuator/reset").success, "a reset once it has left")
+    assert first.output().count("another plant: /test/test_client publishes") <= 2, "a warning and the stop itself"
+    assert enable(client).success
 
 
 def test_a_real_actuator_has_a_short_watchdog(start: Any, client: Any) -> None:

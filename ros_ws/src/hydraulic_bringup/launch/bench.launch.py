@@ -5,8 +5,8 @@
     ros2 launch hydraulic_bringup bench.launch.py plant:=can bus:=my_bench.yaml record:=/tmp/bag experiment:=chirp
     ros2 launch hydraulic_bringup bench.launch.py plant:=sim enable:=true controller:=npid reference:=staircase
 
-The plant is configured and activated; it moves nothing until `enable` is called (or enable:=true is given, which a plant
-on hardware refuses).
+The plant is configured and activated; it moves nothing until `enable` is called (or enable:=true is given, which a
+plant on hardware refuses).
 """
 
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler

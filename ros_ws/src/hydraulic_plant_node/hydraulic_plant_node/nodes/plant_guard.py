@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import time
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 
+from hydraulic_interfaces.qos import profile
 from hydraulic_plant_node.command_gate import CommandGate, Verdict
+from hydraulic_plant_node.name_claim import NameClaim
 from hydraulic_plant_node.nodes.notices import Notices
 from hydraulic_plant_node.plant_backend import BackendError, PlantBackend
 from hydraulic_plant_node.run_marker import RunMarker
 
 HARDWARE_WATCHDOG_S = 0.2
 """Longest silence of a source that a real actuator may be driven through."""
+_LOOK_AROUND_S = 1.0
+"""How long after its start a plant on hardware is configured at the earliest: it knows the others then."""
+_LOOK_EVERY = 5  # calls of `watch`
 
 
 class PlantGuard:
@@ -22,14 +30,26 @@ class PlantGuard:
     def __init__(self, node: Node, gate: CommandGate, backend: PlantBackend) -> None:
         self._node, self._gate, self._backend = node, gate, backend
         self._notices = Notices(node.get_logger().warning)
+        self._domain = node.context.get_domain_id()
+        self._claim = NameClaim(f"plant {self._domain} {node.get_fully_qualified_name()}")
         self._marker: RunMarker | None = None
+        self._made, self._serves, self._watched = time.monotonic(), False, 0
+        self.not_heard = ""
 
     def enter(self, values: Mapping[str, Any]) -> None:
         """Before the plant is configured with these parameters; a real one is stopped if its last run was not ended.
 
-        :raises BackendError: it may not be configured so.
+        :raises BackendError: it may not be configured so, or another one serves the same topics.
         """
+        if not self._claim.take():
+            raise BackendError(
+                f"another process is {self._node.get_fully_qualified_name()} in domain {self._domain}: end it, or give "
+                "this one another ROS_DOMAIN_ID"
+            )
         hardware = self._backend.hardware(values)
+        if hardware:
+            time.sleep(max(self._made + _LOOK_AROUND_S - time.monotonic(), 0.0))
+        self.check_alone()
         if not hardware:
             return
         if values["watchdog"] > HARDWARE_WATCHDOG_S:
@@ -44,17 +64,61 @@ class PlantGuard:
             self._gate.stop(reason)
             self._node.get_logger().warning(f"stopped until reset: {reason}")
 
+    def serve(self) -> None:
+        """After the plant has been configured, when its publisher of `state` has been made."""
+        self._serves = True
+
+    def check_alone(self) -> None:
+        """See that nobody else publishes the state of this plant.
+
+        :raises BackendError: somebody does.
+        """
+        if others := self._others():
+            name = self._node.resolve_topic_name("state")
+            raise BackendError(f"another plant: {', '.join(others)} publishes {name}, and would take the same commands")
+
     def leave(self) -> None:
         """After the plant has been released in order."""
         if self._marker is not None:
             self._marker.end(self._gate.stop_reason)
             self._marker = None
+        if not self._serves:  # else its publisher of `state` lives until the process ends
+            self._claim.give_back()
 
     def watch(self) -> None:
-        """Say in the log, once while it lasts, what is wrong with those that talk to the plant."""
+        """Stop the plant where there is another; log, once while it lasts, what is wrong with those that talk to it."""
         gate, found = self._gate, {}
+        try:
+            self.check_alone()
+        except BackendError as error:
+            if self._serves:
+                gate.stop(str(error))
+                found["other plant"] = str(error)
+        if self._watched % _LOOK_EVERY == 0:
+            self.not_heard = self._not_heard()
+        self._watched += 1
+        if self.not_heard:
+            found["not heard"] = self.not_heard
         if self._notices.moved("rival", gate.counts[Verdict.OTHER_PUBLISHER]):
             found["rival"] = f"a second publisher commands as {gate.rivalled!r} and is refused"
         if self._notices.moved("order", gate.counts[Verdict.OUT_OF_ORDER]):
             found["order"] = "commands are refused: they are not stamped later than the last one of their source"
         self._notices.tell(found)
+
+    def _others(self) -> list[str]:
+        """Nodes, without this one, that publish the state in its namespace."""
+        if self._node.count_publishers("state") <= self._serves:
+            return []
+        infos = self._node.get_publishers_info_by_topic("state")
+        names = Counter(f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos)
+        names[self._node.get_fully_qualified_name()] -= self._serves
+        return sorted(names.elements())
+
+    def _not_heard(self) -> str:
+        """Who publishes commands in a way that the plant's subscription does not take; "" where nobody does."""
+        deaf = []
+        for info in self._node.get_publishers_info_by_topic("command"):
+            compatible, reason = qos_check_compatible(info.qos_profile, profile("command"))
+            if compatible == QoSCompatibility.ERROR:
+                deaf.append(f"{info.node_namespace.rstrip('/')}/{info.node_name} ({reason.rstrip('; ')})")
+        return f"commands are not heard, their QoS does not match: {', '.join(sorted(deaf))}" if deaf else ""

@@ -30,10 +30,18 @@ class PlantHealth:
         refused = sum(count for verdict, count in gate.counts.items() if verdict is not Verdict.ACCEPTED)
         return gate.enabled, gate.stop_reason, gate.timeouts, gate.source, bool(refused), gate.rivalled
 
-    def message(self, state: str, loop: PlantLoop | None, error: str, now_ns: int) -> DiagnosticArray:
-        """The diagnostics now; `state` is the lifecycle state, `error` what made the node leave `active`."""
+    def message(
+        self, state: str, loop: PlantLoop | None, error: str, now_ns: int, not_heard: str = ""
+    ) -> DiagnosticArray:
+        """The diagnostics now.
+
+        `state` is the lifecycle state, `error` what made the node leave `active`, `not_heard` whose commands do not
+        come.
+        """
         timing = [self._timing(loop)] if loop is not None else []
-        return diagnostics.array(now_ns, self._plant(state, error), self._command(state, loop, now_ns), *timing)
+        return diagnostics.array(
+            now_ns, self._plant(state, error), self._command(state, loop, now_ns, not_heard), *timing
+        )
 
     def _plant(self, state: str, error: str) -> DiagnosticStatus:
         gate = self._gate
@@ -54,7 +62,7 @@ class PlantHealth:
         enabled = "enabled" if gate.enabled else "not enabled"
         return self._status("plant", OK, f"{state}, {enabled}", values)
 
-    def _command(self, state: str, loop: PlantLoop | None, now_ns: int) -> DiagnosticStatus:
+    def _command(self, state: str, loop: PlantLoop | None, now_ns: int, not_heard: str) -> DiagnosticStatus:
         gate = self._gate
         counts = {verdict.name.lower(): gate.counts[verdict] for verdict in Verdict}
         values = {
@@ -65,6 +73,7 @@ class PlantHealth:
             "timeouts": gate.timeouts,
             "last_problem": gate.last_problem,
             "second_publisher_of": gate.rivalled,
+            "not_heard": not_heard,
             **counts,
         }
         timeouts = self._moved("timeouts", gate.timeouts)
@@ -74,6 +83,8 @@ class PlantHealth:
             return self._status("command", WARN, message, values)
         if problems:
             return self._status("command", WARN, f"{problems} commands {gate.last_problem}", values)
+        if not_heard:
+            return self._status("command", WARN, not_heard, values)
         if state == "active" and gate.enabled and not gate.source:
             return self._status("command", WARN, "no command: drive is 0 V", values)
         return self._status("command", OK, f"obeys {gate.source!r}" if gate.source else "no source", values)

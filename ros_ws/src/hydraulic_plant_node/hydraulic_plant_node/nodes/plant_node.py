@@ -125,6 +125,8 @@ class PlantNode(LifecycleNode):
         except Exception as error:
             self._release(f"cannot configure: {error}")
             return FAILURE
+        self._ports.open_state()
+        self._guard.serve()
         if self._timing.own_clock:
             self._ports.open_clock()
             self.set_parameters([Parameter("use_sim_time", value=False)])
@@ -269,6 +271,7 @@ class PlantNode(LifecycleNode):
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
+            self._guard.check_alone()
             self._backend.reset()
         except Exception as error:
             response.message = f"the fault is still there: {error}"
@@ -299,7 +302,9 @@ class PlantNode(LifecycleNode):
         if urgent != self._watched or self._watch_count % _REPORT_EVERY == 0:
             self._watched = urgent
             now = self.get_clock().now().nanoseconds if self._loop is None else self._loop.now_ns()
-            self._diagnostics.publish(self._health.message(self._state, self._loop, self._error, now))
+            self._diagnostics.publish(
+                self._health.message(self._state, self._loop, self._error, now, self._guard.not_heard)
+            )
         self._watch_count += 1
         if self._loop is not None:
             # The collector is off while the loop runs; what a call or a report left behind is a handful of

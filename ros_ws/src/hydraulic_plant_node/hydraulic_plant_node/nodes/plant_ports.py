@@ -27,10 +27,10 @@ from hydraulic_plant_node.command_gate import CommandGate
 
 
 class PlantPorts:
-    """Publishers of a plant and its command subscription, all in the namespace of `node`."""
+    """Publishers of a plant and its command subscription, all in the namespace of `node`; `state` once it is opened."""
 
     def __init__(self, node: Node) -> None:
-        self._state = self._publisher(node, "state")
+        self._state: Any = None
         self._pressures = tuple(self._publisher(node, f"pressure_{name}") for name in ("a", "b", "supply"))
         self._retracted = self._publisher(node, "limit_retracted")
         self._extended = self._publisher(node, "limit_extended")
@@ -71,6 +71,11 @@ class PlantPorts:
         if self._recorders is None or not self._recorders.get_publisher_count():
             self._recorded = {}
         return min(self._recorded.values(), default=None)
+
+    def open_state(self) -> None:
+        """Become the plant of this namespace: whoever publishes `state` is."""
+        if self._state is None:
+            self._state = self._publisher(self._node, "state")
 
     def follow_recorders(self) -> None:
         """Hear from now on how far recorders are."""
