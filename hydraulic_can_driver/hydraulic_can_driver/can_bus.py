@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import socket
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +23,8 @@ _ADDRESS_AND_PORT = re.compile(r"(?P<group>[\d.]+):(?P<port>\d+)")
 def open_can(interface: str, channel: str, bitrate: int = 1_000_000) -> can.BusABC:
     """A python-can bus; `udp_multicast` takes "group" or "group:port" and never leaves this machine.
 
-    Frames from outside would move an actuator: multicast packets are sent with a life of 0 hops.
+    Frames from outside would move an actuator: packets are sent with a life of 0 hops, and taken from the loopback
+    interface alone.
 
     :raises BusDownError: there is no such interface or channel.
     """
@@ -32,9 +36,27 @@ def open_can(interface: str, channel: str, bitrate: int = 1_000_000) -> can.BusA
     elif interface != "socketcan":  # there the kernel has the bit rate
         options["bitrate"] = bitrate
     try:
-        return can.Bus(**options)
+        bus = can.Bus(**options)
+        if interface == "udp_multicast":
+            _keep_on_this_machine(bus, options["channel"])
+        return bus
     except (can.CanError, OSError, ValueError, ImportError, TypeError) as error:
         raise BusDownError(f"CAN interface {interface}, channel {channel!r}: {error or type(error).__name__}") from None
+
+
+def _keep_on_this_machine(bus: can.BusABC, group: str) -> None:
+    """Move the socket of a multicast bus, which python-can opens on every interface, to the loopback interface."""
+    with socket.socket(fileno=os.dup(bus.fileno())) as end:
+        lo = socket.if_nametoindex("lo")
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")
+        if end.family == socket.AF_INET6:
+            member = struct.pack("@16sI", socket.inet_pton(end.family, group), lo)
+            end.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_MULTICAST_IF, lo)
+            end.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_JOIN_GROUP, member)
+            return
+        where = struct.pack("@4s4si", socket.inet_aton(group), socket.inet_aton("127.0.0.1"), lo)
+        end.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, where)
+        end.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, where)
 
 
 def programs_only(interface: str, channel: str) -> bool:

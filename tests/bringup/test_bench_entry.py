@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from hydraulic_bringup.entry.checkout import Checkout
+from hydraulic_bringup.entry.environment import command_variables
 from hydraulic_bringup.entry.environment_plan import STAMP, Stamp, wanted
 from hydraulic_bringup.entry.ros import Ros
 
@@ -214,6 +215,22 @@ def test_executables_see_the_environment_and_the_workspace(built: FakeCheckout) 
 def test_discovery_range_of_the_user_is_kept(built: FakeCheckout) -> None:
     built.bench("run", "pump", "start", ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET")
     assert "ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET\n" in (built.root / "env.txt").read_text()
+
+
+@pytest.mark.parametrize(
+    ("given", "profile"),
+    [
+        ({}, "fastdds.xml"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "fastdds_network.xml"),
+        ({"FASTRTPS_DEFAULT_PROFILES_FILE": "/theirs.xml"}, "theirs.xml"),
+        ({"FASTDDS_DEFAULT_PROFILES_FILE": "/theirs.xml"}, None),
+    ],
+)
+def test_sockets_stay_on_this_machine_by_default(
+    given: dict[str, str], profile: str | None
+) -> None:
+    seen = command_variables(Checkout(ROOT), Ros(), given).get("FASTRTPS_DEFAULT_PROFILES_FILE")
+    assert (seen and Path(seen).name) == profile
 
 
 def test_run_hands_over_to_ros2_where_it_is_installed(built: FakeCheckout, tmp_path: Path) -> None:

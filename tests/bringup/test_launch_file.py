@@ -137,7 +137,7 @@ def test_parameter_files_fit_their_nodes(plant: str) -> None:
 def test_what_it_imports_is_declared() -> None:
     manifest = (BRINGUP / "package.xml").read_text(encoding="utf-8")
     modules = {(n.module or "").split(".")[0] for n in ast.walk(TREE) if isinstance(n, ast.ImportFrom)}
-    assert modules == {"launch", "launch_ros", "lifecycle_msgs"}
+    assert modules == {"launch", "launch_ros", "lifecycle_msgs", "hydraulic_node_utils"}
     for module in modules:
         assert f"<exec_depend>{module}</exec_depend>" in manifest
 

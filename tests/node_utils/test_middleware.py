@@ -28,15 +28,43 @@ def test_fast_dds_reads_its_profile_without_a_complaint(ros_domain: int, tmp_pat
         done = subprocess.run(command, env=variables, capture_output=True, text=True, check=True)
         return done.stdout + done.stderr
 
-    assert complaints(middleware.VARIABLES["FASTRTPS_DEFAULT_PROFILES_FILE"]) == ""
+    local = middleware.VARIABLES[middleware.PROFILES[0]]
+    assert complaints(local) == ""
+    assert complaints(middleware.variables({middleware.RANGE: "SUBNET"})[middleware.PROFILES[0]]) == ""
     (tmp_path / "bad.xml").write_text(
         '<dds><profiles><data_writer profile_name="bad"><times><beat/></times></data_writer></profiles></dds>'
     )
     assert "XMLPARSER" in complaints(str(tmp_path / "bad.xml")), "one that is not understood would be complained of"
 
 
-def test_the_users_own_environment_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in middleware.VARIABLES:
-        monkeypatch.setenv(name, "theirs")
+LOCAL = middleware.VARIABLES[middleware.PROFILES[0]]
+NETWORK = LOCAL.replace("fastdds", "fastdds_network")
+
+
+@pytest.mark.parametrize(
+    ("given", "added", "reached"),
+    [
+        ({}, middleware.VARIABLES, False),
+        ({middleware.RANGE: "OFF"}, {middleware.PROFILES[0]: LOCAL}, False),
+        ({middleware.RANGE: "SUBNET"}, {middleware.PROFILES[0]: NETWORK}, True),
+        ({middleware.PROFILES[0]: "theirs.xml"}, {middleware.RANGE: "LOCALHOST"}, True),
+        ({middleware.PROFILES[1]: "theirs.xml", middleware.RANGE: "LOCALHOST"}, {}, True),
+        ({middleware.PROFILES[0]: "", middleware.RANGE: ""}, {}, True),
+    ],
+)
+def test_the_users_own_environment_is_kept(
+    given: dict[str, str], added: dict[str, str], reached: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in (middleware.RANGE, *middleware.PROFILES):
+        monkeypatch.setenv(name, "before")  # so that it is restored
+        monkeypatch.delenv(name)
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
     middleware.set_up()
-    assert {os.environ[name] for name in middleware.VARIABLES} == {"theirs"}
+    seen = {name: os.environ[name] for name in (middleware.RANGE, *middleware.PROFILES) if name in os.environ}
+    assert seen == given | added
+    assert bool(middleware.reach(os.environ, "rmw_fastrtps_cpp")) is reached
+
+
+def test_another_middleware_is_its_own_affair() -> None:
+    assert "rmw_cyclonedds_cpp" in middleware.reach(middleware.VARIABLES, "rmw_cyclonedds_cpp")

@@ -18,6 +18,7 @@ from launch_ros.events.lifecycle import ChangeState
 from launch_ros.substitutions import FindPackageShare
 from lifecycle_msgs.msg import Transition
 
+from hydraulic_node_utils.nodes import middleware
 from launch import LaunchDescription
 
 CONTROLLERS = ("npid", "pid", "pole_placement")
@@ -42,7 +43,8 @@ ARGUMENTS = (
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Arguments first, then the nodes that they ask for."""
+    """Arguments first, then the nodes that they ask for; all of this machine alone, as the launch process itself."""
+    middleware.set_up()
     declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
     return LaunchDescription([*declared, OpaqueFunction(function=_nodes)])
 

@@ -20,6 +20,7 @@ from typing import Protocol
 
 from hydraulic_bringup.verbs.virtual_bench import READY
 from hydraulic_interfaces.contract import ABORTED
+from hydraulic_node_utils.nodes import middleware
 from hydraulic_sysid.excitation import NOT_STARTED, load_plan
 
 from .errors import DemoError
@@ -97,7 +98,7 @@ def run(
 @contextmanager
 def private_domain() -> Iterator[dict[str, str]]:
     """The environment of a ROS domain of one's own on this machine; also set in this process meanwhile."""
-    changed = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "PYTHONUNBUFFERED": "1"}
+    changed = {**middleware.VARIABLES, "PYTHONUNBUFFERED": "1"}
     before = {name: os.environ.get(name) for name in (*changed, "ROS_DOMAIN_ID")}
     try:
         with _free_domain() as number:

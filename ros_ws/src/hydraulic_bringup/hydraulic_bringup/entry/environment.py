@@ -9,12 +9,17 @@ from pathlib import Path
 from .checkout import Checkout
 from .ros import DISTRO, Ros
 
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+LOCAL = ("LOCALHOST", "OFF")
+PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+PROFILE_FOLDER = Path("ros_ws", "src", "hydraulic_node_utils", "hydraulic_node_utils", "nodes")
+
 
 def command_variables(checkout: Checkout, ros: Ros, environ: Mapping[str, str]) -> dict[str, str]:
     """`environ` as after activating `.venv` and sourcing `ros_ws/install/setup.sh`.
 
-    Discovery stays on this machine unless the user chose otherwise: a stranger on the network must not move
-    an actuator.
+    Discovery and sockets stay on this machine unless the user chose otherwise: a stranger on the network must not
+    move an actuator.
     """
     result = dict(environ)
     result.pop("PYTHONHOME", None)
@@ -26,7 +31,10 @@ def command_variables(checkout: Checkout, ros: Ros, environ: Mapping[str, str]) 
     versions = [folder.name for folder in checkout.venv.glob("lib/python3*")]  # one: that of its interpreter
     modules = [prefix / "lib" / version / "site-packages" for prefix in installed for version in versions]
     result["PYTHONPATH"] = joined(filter(Path.is_dir, modules), environ.get("PYTHONPATH", ""))
-    result.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    result.setdefault(RANGE, "LOCALHOST")
+    profile = checkout.root / PROFILE_FOLDER / ("fastdds.xml" if result[RANGE] in LOCAL else "fastdds_network.xml")
+    if not any(environ.get(name) for name in PROFILES) and profile.is_file():
+        result[PROFILES[0]] = str(profile)  # for tools as well; the nodes do the same by themselves
     result.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads only spin: matrices are small
     if not ros.prefix:
         result.update(wheel_variables(checkout.venv, environ))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -9,8 +10,10 @@ from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.utilities import get_rmw_implementation_identifier
 
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes import middleware
 from hydraulic_plant_node.command_gate import CommandGate, Verdict
 from hydraulic_plant_node.name_claim import NameClaim
 from hydraulic_plant_node.nodes.notices import Notices
@@ -50,6 +53,8 @@ class PlantGuard:
         if hardware:
             time.sleep(max(self._made + _LOOK_AROUND_S - time.monotonic(), 0.0))
         self.check_alone()
+        if reason := middleware.reach(os.environ, get_rmw_implementation_identifier()):
+            self._node.get_logger().warning(reason)
         if not hardware:
             return
         if values["watchdog"] > HARDWARE_WATCHDOG_S:

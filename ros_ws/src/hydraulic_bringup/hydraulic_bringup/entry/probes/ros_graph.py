@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 from ..bench import Bench
+from ..environment import PROFILES
 from ..errors import BenchError
 from ..executables import executables
 from ..findings import NOTE, Finding
@@ -69,6 +70,10 @@ def _discovery(bench: Bench) -> list[Finding]:
         if wide
         else ""
     )
+    own = next((bench.environ[name] for name in PROFILES if bench.environ.get(name)), "")
+    if own and not wide:
+        remedy = f"sockets: as your Fast DDS profile {own} says; docs/safety.md, who may talk"
+    wide = wide or bool(own)
     found = [Finding("discovery", f"range {given or 'LOCALHOST'}, domain {domain}", remedy, NOTE if wide else "ok")]
     chosen = bench.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     if not bench.ros.prefix and chosen != "rmw_fastrtps_cpp":
