@@ -21,7 +21,7 @@ _ADDRESS_AND_PORT = re.compile(r"(?P<group>[\d.]+):(?P<port>\d+)")
 
 
 def open_can(interface: str, channel: str, bitrate: int = 1_000_000) -> can.BusABC:
-    """A python-can bus; `udp_multicast` takes "group" or "group:port" and never leaves this machine.
+    """A python-can bus; `udp_multicast` takes "group" or "group:port" (IPv4) and never leaves this machine.
 
     Frames from outside would move an actuator: packets are sent with a life of 0 hops, and taken from the loopback
     interface alone.
@@ -30,6 +30,8 @@ def open_can(interface: str, channel: str, bitrate: int = 1_000_000) -> can.BusA
     """
     options: dict[str, Any] = {"interface": interface, "channel": channel}
     if interface == "udp_multicast":
+        if ":" in channel.partition(":")[2]:
+            raise BusDownError(f"CAN interface {interface}, channel {channel!r}: only IPv4 groups stay on this machine")
         options |= {"hop_limit": 0, "fd": False}
         if address := _ADDRESS_AND_PORT.fullmatch(channel):
             options |= {"channel": address["group"], "port": int(address["port"])}
@@ -49,11 +51,6 @@ def _keep_on_this_machine(bus: can.BusABC, group: str) -> None:
     with socket.socket(fileno=os.dup(bus.fileno())) as end:
         lo = socket.if_nametoindex("lo")
         end.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")
-        if end.family == socket.AF_INET6:
-            member = struct.pack("@16sI", socket.inet_pton(end.family, group), lo)
-            end.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_MULTICAST_IF, lo)
-            end.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_JOIN_GROUP, member)
-            return
         where = struct.pack("@4s4si", socket.inet_aton(group), socket.inet_aton("127.0.0.1"), lo)
         end.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, where)
         end.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, where)

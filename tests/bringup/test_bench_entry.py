@@ -226,9 +226,7 @@ def test_discovery_range_of_the_user_is_kept(built: FakeCheckout) -> None:
         ({"FASTDDS_DEFAULT_PROFILES_FILE": "/theirs.xml"}, None),
     ],
 )
-def test_sockets_stay_on_this_machine_by_default(
-    given: dict[str, str], profile: str | None
-) -> None:
+def test_sockets_stay_on_this_machine_by_default(given: dict[str, str], profile: str | None) -> None:
     seen = command_variables(Checkout(ROOT), Ros(), given).get("FASTRTPS_DEFAULT_PROFILES_FILE")
     assert (seen and Path(seen).name) == profile
 

@@ -7,6 +7,12 @@ from pathlib import Path
 import pytest
 
 from hydraulic_can_driver import can_bus
+from hydraulic_can_driver.errors import BusDownError
+
+
+def test_a_group_that_cannot_be_kept_on_this_machine_is_refused() -> None:
+    with pytest.raises(BusDownError, match="only IPv4"):
+        can_bus.open_can("udp_multicast", "ff15:7079:7468:6f6e:6465:6d6f:6d63:6173")
 
 
 @pytest.mark.parametrize(
