@@ -12,10 +12,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from hydraulic_can_driver.bus import Bus, Node
-from hydraulic_can_driver.can_bus import PROGRAMS_ONLY
+from hydraulic_can_driver.can_bus import PROGRAMS_ONLY, programs_only
 from hydraulic_can_driver.cia408 import CONTROL_WORDS, State, StateMachine, describe, state_of
 from hydraulic_can_driver.codec import PdoCodec
-from hydraulic_can_driver.errors import BusDownError, DeviceError
+from hydraulic_can_driver.errors import BusDownError, BusFileError, DeviceError
 from hydraulic_can_driver.faults import NEEDS_CONFIGURE, BusFault, FaultLatch
 from hydraulic_can_driver.frames import Frames
 from hydraulic_can_driver.master import ERROR_REGISTER, PRE_OPERATIONAL, START, Master
@@ -28,6 +28,9 @@ from hydraulic_interfaces.samples import PlantSample
 
 KERNEL_SYNC = ("socketcan",)
 """Interfaces whose kernel sends messages periodically by itself."""
+
+LONGEST_LOSS_S = 0.5
+"""How long a real valve may go on after it has lost its driver: `lost_after` and the timeout of its drives."""
 
 _QUIET = (State.INIT, State.DISABLED, State.FAULT_DISABLED, State.NOT_READY)
 """States in which the spool does not follow the setpoint; the last two only after a fault."""
@@ -46,6 +49,7 @@ class Bench:
     answer are a fault at once.
 
     :raises BusDownError: the interface cannot be opened, or is not one for lockstep.
+    :raises BusFileError: the valve would go on for too long without its driver, and is no virtual one.
     """
 
     def __init__(self, bus: Bus, interface: str = "", channel: str = "", lockstep: bool = False) -> None:
@@ -53,6 +57,7 @@ class Bench:
         kernel = interface in KERNEL_SYNC
         if lockstep and interface not in PROGRAMS_ONLY:
             raise BusDownError(f"lockstep on {interface}: only virtual devices wait, on {' or '.join(PROGRAMS_ONLY)}")
+        _check_loss(bus, interface, channel or bus.channel)
         if lockstep:
             bus = replace(bus, monitoring=replace(bus.monitoring, missed_cycles=1))
         self.bus = bus
@@ -333,3 +338,12 @@ class Bench:
                 self._valve_state = state_of(int(self.master.read(self.bus.valve, self._status)))
             except HydraulicError as error:
                 self.faults.report(BusFault.BUS, str(error))
+
+
+def _check_loss(bus: Bus, interface: str, channel: str) -> None:
+    if programs_only(interface, channel):
+        return
+    for name, seconds in (("lost_after", bus.master.lost_after), ("timeout of the drive", bus.drive_pdo.timeout)):
+        if seconds > LONGEST_LOSS_S:
+            where = f"on {interface} {channel}, where a valve may be real"
+            raise BusFileError(f"{bus.path}: {name} is {seconds:g} s; allowed {where}: up to {LONGEST_LOSS_S:g} s")

@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from hydraulic_plant_node.travel_limits import EndsOfTravel
+
 TYPES: Mapping[str, str] = {"u8": "B", "u16": "H", "u32": "I", "i8": "b", "i16": "h", "i32": "i", "f32": "f"}
 """Types of objects, and their letters in `struct` (always little-endian)."""
 
@@ -83,7 +85,10 @@ class Signal:
 
 @dataclass(frozen=True)
 class Pdo:
-    """A process data object: `number` counts from 1, `transmission` as in CiA 301, `timeout` [s] of a received one."""
+    """A process data object: `number` counts from 1, `transmission` as in CiA 301.
+
+    `timeout` [s] of a received one; 0: the device waits for it for ever.
+    """
 
     number: int
     cob_id: int
@@ -124,7 +129,10 @@ class Reading:
 
 @dataclass(frozen=True)
 class Node:
-    """A device: `profile` is the lower half of its 0x1000, `identity` what its 0x1018 must say, `heartbeat` in s."""
+    """A device: `profile` is the lower half of its 0x1000, `identity` what its 0x1018 must say.
+
+    `heartbeat` in s; 0: it sends none.
+    """
 
     name: str
     id: int
@@ -157,13 +165,18 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the actuator may be asked to do, and what its sensors may say; V, m, m/s, s, share of travel, Pa."""
+    """What the actuator may be asked to do, and what its sensors may say; V, m, m/s, share of travel, Pa.
+
+    `full_speed` is that of the piston at 10 V. `braking` before the ends of the stroke: None where there is to be none.
+    """
 
     drive: float
     position: tuple[float, float]
     position_margin: float
     velocity: float
-    frozen_time: float
+    full_speed: float
+    braking: EndsOfTravel | None
+    frozen_travel: float
     frozen_spool: float
     frozen_supply: float
 
@@ -202,6 +215,15 @@ class Bus:
             for pdo in node.transmit:
                 for signal in pdo.signals:
                     yield node, pdo, signal
+
+    @property
+    def unprotected(self) -> tuple[str, ...]:
+        """Protections that the file does without, each by an explicit `none`."""
+        silent = [f"heartbeat of {node.name}" for node in self.nodes.values() if not node.heartbeat]
+        timeout = [] if self.drive_pdo.timeout else ["drive timeout of the valve"]
+        switches = [] if self.signal("switches") else ["limit switches"]
+        braking = [] if self.limits.braking else ["braking before the ends of travel"]
+        return (*silent, *timeout, *switches, *braking)
 
     @property
     def valve(self) -> Node:

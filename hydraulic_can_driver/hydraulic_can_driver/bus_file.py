@@ -34,6 +34,7 @@ from hydraulic_can_driver.bus import (
 from hydraulic_can_driver.codec import raw_range
 from hydraulic_can_driver.eds_check import check_against_eds
 from hydraulic_can_driver.errors import BusFileError
+from hydraulic_plant_node.travel_limits import EndsOfTravel
 
 FORMAT = "hydraulic-bus-1"
 SHIPPED = Path(__file__).parent / "buses"
@@ -83,6 +84,8 @@ def load_bus(name: str | Path) -> Bus:
     )
     nodes = top.section("nodes")
     bus = replace(bus, nodes={name: nodes.read(name, partial(_node, name)) for name in nodes.names()})
+    if bus.signal("switches") is None:
+        top.unless_none("limit_switches", lambda: top.take("limit_switches", object), "no frame carries switches")
     top.done()
     _check(bus, nodes)
     check_against_eds(bus)
@@ -128,6 +131,13 @@ class _Section:
         if kind in (int, float) and not (math.isfinite(value) and low <= value <= high):
             raise self.fail(key, f"{key} is {value:g}; allowed: {low:g} ... {high:g}")
         return kind(value) if kind in (int, float, str) else value
+
+    def unless_none(self, key: str, take: Callable[[], T], what: str) -> T | None:
+        """What `take` reads under a key; None where the file says `none`: the bench then does without ``what``."""
+        self._read.add(key)
+        if key not in self._node:
+            raise self.fail(key, f"{self._where} has no {key!r}: {what}; a bench without it says {key}: none")
+        return None if self._node[key] == "none" else take()
 
     def section(self, key: str, optional: bool = False) -> _Section:
         """The mapping under a key."""
@@ -181,12 +191,27 @@ def _limits(at: _Section) -> Limits:
     position = at.take("position", list)
     if len(position) != 2 or not all(isinstance(x, int | float) for x in position) or not position[0] < position[1]:
         raise at.fail("position", f"position is {list(position)!r}; expected [lowest, highest], m")
+    low, high, full_speed = float(position[0]), float(position[1]), at.take("full_speed", float, low=1e-6, high=100.0)
+
+    def braking(at: _Section) -> EndsOfTravel:
+        return EndsOfTravel(
+            low,
+            high,
+            at.take("impact_speed", float, low=1e-4, high=1.0),
+            full_speed,
+            at.take("deceleration", float, low=1e-3, high=1e3),
+            at.take("reaction", float, low=1e-3, high=10.0),
+            at.take("slew", float, low=1.0, high=1e6),
+        )
+
     return Limits(
         at.take("drive", float, 10.0, 1e-3, 10.0),
-        (float(position[0]), float(position[1])),
+        (low, high),
         at.take("position_margin", float, low=0.0),
         at.take("velocity", float, low=1e-6),
-        at.take("frozen_time", float, low=1e-3),
+        full_speed,
+        at.unless_none("braking", lambda: at.read("braking", braking), "slew and speed before the stops"),
+        at.take("frozen_travel", float, low=1e-6, high=1.0),
         at.take("frozen_spool", float, low=0.0, high=1.0),
         at.take("frozen_supply", float, low=0.0),
     )
@@ -210,9 +235,10 @@ def _node(name: str, at: _Section) -> Node:
         profile=at.take("profile", int, low=301, high=499),
         eds=at.take("eds", str, ""),
         identity={key: identity.take(key, int, low=0, high=0xFFFFFFFF) for key in identity.names()},
-        heartbeat=at.take("heartbeat", float, 0.0, 0.0, 60.0),
+        heartbeat=at.unless_none("heartbeat", lambda: at.take("heartbeat", float, low=0.001, high=1.0), "its period, s")
+        or 0.0,
         boot=at.rows("boot", _write),
-        receive=at.rows("receive", partial(_pdo, SENT)),
+        receive=at.rows("receive", _received),
         transmit=at.rows("transmit", partial(_pdo, [name for name in SIGNALS if name not in SENT])),
         inspect=at.rows("inspect", _reading),
     )
@@ -267,13 +293,18 @@ def _reading(at: _Section) -> Reading:
     )
 
 
+def _received(at: _Section) -> Pdo:
+    what = "after how many s the valve misses a drive"
+    timeout = at.unless_none("timeout", lambda: at.take("timeout", float, low=0.002, high=60.0), what)
+    return replace(_pdo(SENT, at), timeout=timeout or 0.0)
+
+
 def _pdo(allowed: Sequence[str], at: _Section) -> Pdo:
     found = Pdo(
         number=at.take("number", int, low=1, high=512),
         cob_id=at.take("cob_id", int, low=0x181, high=0x57F),
         transmission=at.take("transmission", int, 1, 1, 255),
         signals=at.rows("map", partial(_signal, allowed)),
-        timeout=at.take("timeout", float, 0.0, 0.0, 60.0),
     )
     if not 1 <= found.length <= 8:
         raise at.fail("map", f"map has {found.length} bytes; a frame carries 1 ... 8")

@@ -33,7 +33,15 @@ def warnings(bus: Bus) -> list[str]:
         if node.heartbeat <= 0.0:
             found.append(f"`{node.name}`: sends no heartbeat; its loss shows only in missing frames.")
     if bus.drive_pdo.timeout <= 0.0:
-        found.append("The valve does not watch for missing set-points (`timeout` of its frame is 0).")
+        found.append("The valve does not watch for missing set-points (`timeout` of its frame is none).")
+    lost, braking = max(bus.master.lost_after, bus.drive_pdo.timeout), bus.limits.braking
+    if braking is None:
+        found.append("No braking before the ends of travel: any source may drive the piston into a stop at full speed.")
+    elif braking.reaction < lost:
+        found.append(
+            f"Braking reckons with {braking.reaction:g} s of reaction, the valve goes on for up to {lost:g} s when its "
+            "driver is lost: near an end it may then meet the stop faster than `impact_speed`."
+        )
     if bus.signal("switches") is None:
         found.append("No limit switches: nothing but the position stops a drive into an end.")
     if bus.signal("pressure_supply") is None:

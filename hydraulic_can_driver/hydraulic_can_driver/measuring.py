@@ -43,7 +43,7 @@ class Measuring:
                 what = name.removesuffix("_status")
                 yield BusFault.SENSOR, f"{what} is not valid: status 0x{int(value):02X} (cable break, overload)"
         opening, supply = self._opening(found), found.get("pressure_supply", NAN)
-        if problem := self._check.problem(stamp_ns, found["position"], opening, supply, bool(self.closed)):
+        if problem := self._check.problem(stamp_ns, found["position"], opening, supply):
             yield BusFault.POSITION, problem
 
     def sample(self, stamp_ns: int, drive: float, found: Mapping[str, float]) -> PlantSample:
@@ -68,4 +68,4 @@ class Measuring:
         if self._spool is None:
             return NAN
         scale = self._spool.scale
-        return (found["spool"] - scale.offset) / scale.gain / FULL_SCALE
+        return (found["spool"] - scale.offset) / abs(scale.gain) / FULL_SCALE

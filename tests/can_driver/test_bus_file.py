@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from hydraulic_can_driver.bench import Bench
 from hydraulic_can_driver.bus_file import SHIPPED, load_bus, shipped
 from hydraulic_can_driver.errors import BusFileError
 from hydraulic_can_driver.supervision import bus_load
@@ -32,6 +33,9 @@ def test_load_of_the_bus() -> None:
     # SYNC and five to seven frames of at most 7 bytes, 500 times a second, at 1 Mbit/s.
     assert bus_load(load_bus("bench")) == pytest.approx(0.29, abs=0.02)
 
+
+SWITCHES = next(line for line in TEXT.splitlines(keepends=True) if "signal: switches" in line)
+BRAKING = TEXT[TEXT.index("  braking:") : TEXT.index("  frozen_travel:")]
 
 REFUSED = {
     "no such file": (None, "", "cannot be read"),
@@ -79,9 +83,20 @@ REFUSED = {
         "signal: position_status, object: 0x6004, sub: 0, type: u32",
         "no frame carries position",
     ),
+    "no heartbeat": (
+        "    heartbeat: 0.05\n",
+        "",
+        "has no 'heartbeat': its period, s; a bench without it says heartbeat: none",
+    ),
+    "heartbeat of 0": ("    heartbeat: 0.05\n", "    heartbeat: 0\n", "heartbeat is 0; allowed: 0.001 ... 1"),
+    "no drive timeout": ("timeout: 0.1 ", "# ", "has no 'timeout': after how many s the valve misses a drive"),
+    "no switches": (SWITCHES, "", "has no 'limit_switches': no frame carries switches"),
+    "switches and none": ("rate: 500", "rate: 500\nlimit_switches: none", "has no key 'limit_switches'"),
+    "no braking": (BRAKING, "", "has no 'braking': slew and speed before the stops; a bench without it says"),
+    "impact speed": ("impact_speed: 0.05", "impact_speed: 5", "impact_speed is 5; allowed: 0.0001 ... 1"),
     "two valves": (
         "    transmit:             # TxPDO",
-        "      - {number: 5, cob_id: 0x511, map: []}\n    transmit: # TxPDO",
+        "      - {number: 5, cob_id: 0x511, timeout: none, map: []}\n    transmit: # TxPDO",
         "a frame carries 1 ... 8",
     ),
 }
@@ -97,3 +112,32 @@ def test_refused(case: str, tmp_path: Path) -> None:
     with pytest.raises(BusFileError) as caught:
         load_bus(path)
     assert str(path) in str(caught.value) and words in str(caught.value)
+
+
+def test_protection_that_a_bench_does_without_is_named(tmp_path: Path) -> None:
+    """Each by an explicit `none`, or the file is refused (above)."""
+    assert load_bus("bench").unprotected == ()
+    path = tmp_path / "bus.yaml"
+    text = TEXT.replace(BRAKING, "  braking: none\n").replace(SWITCHES, "").replace("timeout: 0.1 ", "timeout: none ")
+    path.write_text(
+        text.replace("heartbeat: 0.05", "heartbeat: none").replace("\nrate:", "\nlimit_switches: none\nrate:", 1)
+    )
+    bus = load_bus(path)
+    assert bus.unprotected == (
+        *(f"heartbeat of {name}" for name in bus.nodes),
+        "drive timeout of the valve",
+        "limit switches",
+        "braking before the ends of travel",
+    )
+    assert bus.limits.braking is None and bus.drive_pdo.timeout == 0.0 and bus.valve.heartbeat == 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "name"), [("lost_after: 0.1 ", "lost_after"), ("timeout: 0.1 ", "timeout of the drive")]
+)
+def test_a_real_valve_does_not_go_on_for_long_without_its_driver(old: str, name: str, tmp_path: Path) -> None:
+    path = tmp_path / "bus.yaml"
+    path.write_text(TEXT.replace(old, old.replace("0.1", "10.0")))
+    with pytest.raises(BusFileError, match=rf"{name} is 10 s; allowed on socketcan can7, .*: up to 0.5 s"):
+        Bench(load_bus(path), "socketcan", "can7")
+    Bench(load_bus(path), "virtual", name).close()

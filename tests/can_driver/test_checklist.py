@@ -63,6 +63,11 @@ def test_what_is_not_watched_is_warned_of() -> None:
     found = " ".join(warnings(replace(BUS, nodes=blind)))
     assert "No limit switches" in found
     assert "No supply pressure" in found
+    braking = BUS.limits.braking
+    assert braking is not None and "Braking" not in " ".join(warnings(BUS))
+    hasty = replace(BUS, limits=replace(BUS.limits, braking=replace(braking, reaction=0.05)))
+    assert "Braking reckons with 0.05 s of reaction, the valve goes on for up to 0.1 s" in " ".join(warnings(hasty))
+    assert "No braking" in " ".join(warnings(replace(BUS, limits=replace(BUS.limits, braking=None))))
 
 
 def test_verb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

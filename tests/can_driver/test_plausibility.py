@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import pytest
 
@@ -31,21 +32,49 @@ def test_jump_is_measured_over_the_time_that_passed() -> None:
     assert check.problem(24 * MS, 0.020) == "", "16 mm over ten lost samples"
 
 
-def frozen(opening: float, supply: float, at_end: bool = False) -> str:
+def travelled(opening: float, supply: float, position: Callable[[float], float], seconds: float = 10.0) -> str:
+    """The first problem of a piston that goes as `position` [m] of the time [s] says, 500 times a second."""
     check = PositionCheck(LIMITS)
-    return next(filter(None, (check.problem(t * MS, 0.1, opening, supply, at_end) for t in range(0, 700, 2))), "")
+    times = (0.002 * i for i in range(round(500 * seconds)))
+    found = (check.problem(round(1e9 * t), position(t), opening, supply) for t in times)
+    return next(filter(None, found), "")
+
+
+def flickering(t: float) -> float:
+    return 0.1 + 1e-6 * (round(t / 0.002) % 2)
 
 
 def test_frozen_only_where_it_should_move() -> None:
-    assert "frozen at 0.1 m for 0.50 s while the spool is 50% open" in frozen(0.5, 14e6)
-    assert "frozen" in frozen(-0.5, math.nan), "no transducer on the supply"
-    assert frozen(0.05, 14e6) == "", "nearly closed"
-    assert frozen(0.5, 0.1e6) == "", "hydraulics off"
-    assert frozen(0.5, 14e6, at_end=True) == "", "at a limit switch"
-    assert frozen(math.nan, 14e6) == "", "no spool is measured"
+    assert "it moved 0.001 mm where the opening of the spool promises 20" in travelled(0.5, 14e6, flickering)
+    assert "frozen" in travelled(-0.5, math.nan, flickering), "no transducer on the supply"
+    assert travelled(0.05, 14e6, flickering) == "", "nearly closed"
+    assert travelled(0.5, 0.1e6, flickering) == "", "hydraulics off"
+    assert travelled(math.nan, 14e6, flickering) == "", "no spool is measured"
 
 
-def test_one_count_of_movement_is_enough() -> None:
+def test_frozen_is_noticed_before_the_piston_is_far() -> None:
+    """At full opening after 20 mm, at any opening: in time for braking before the ends."""
+    assert "frozen" in travelled(1.0, 14e6, flickering, seconds=0.05)
+    assert "frozen" in travelled(0.11, 14e6, flickering, seconds=0.4)
+
+
+def test_a_piston_at_its_stop_may_stand_but_not_leave_it_unseen() -> None:
+    assert travelled(1.0, 14e6, lambda t: 0.762) == ""
+    assert "frozen" in travelled(-1.0, 14e6, lambda t: 0.762), "it should leave"
+
+
+def test_a_slow_piston_is_none_that_is_frozen() -> None:
+    """A fifth of the speed that the opening promises: load, low pressure, an overlapped valve."""
+    assert travelled(0.5, 14e6, lambda t: 0.05 * t) == ""
+    assert travelled(-0.5, 2e6, lambda t: -0.05 * t) == ""
+
+
+def test_an_opening_that_swings_is_compared_by_its_range() -> None:
     check = PositionCheck(LIMITS)
-    for t in range(0, 2000, 2):
-        assert check.problem(t * MS, 0.1 + 1e-6 * (t // 400 % 2), 0.5, 14e6) == ""
+    for i in range(1000):
+        t = 0.002 * i
+        moved = 0.25 / (2.0 * math.pi) * (1.0 - math.cos(2.0 * math.pi * t))
+        assert check.problem(round(1e9 * t), moved, 0.5 * math.sin(2.0 * math.pi * t), 14e6) == ""
+    stuck = PositionCheck(LIMITS)
+    found = (stuck.problem(2 * i * MS, 0.1, 0.5 * math.sin(4e-3 * math.pi * i), 14e6) for i in range(1000))
+    assert any("frozen" in problem for problem in found)

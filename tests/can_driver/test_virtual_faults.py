@@ -23,7 +23,6 @@ def far_fixture() -> Iterator[Station]:
 
 CASES = [
     (faults.PositionJump("lvdt", 0.05), "80ea0d00000000"),
-    (faults.PositionStuck("lvdt", -0.2), "50930800000000"),
     (faults.LimitSwitch("lvdt", "extended"), "30270d00000002"),
     (faults.LimitSwitch("lvdt", "retracted"), "30270d00000004"),
     (faults.PdoLength("lvdt", 3), "30270d"),
@@ -40,12 +39,17 @@ def test_what_the_displacement_sensor_sends(far: Station, fault: faults.Injected
     assert far.sync(POSITION) == HEALTHY
 
 
-def test_frozen(far: Station) -> None:
+@pytest.mark.parametrize(
+    ("fault", "raw"), [(faults.PositionFrozen("lvdt"), 862_000), (faults.PositionStuck("lvdt", -0.2), 562_000)]
+)
+def test_a_position_that_stands_still_but_for_a_count(far: Station, fault: faults.InjectedFault, raw: int) -> None:
     assert far.sync(POSITION) == HEALTHY
-    far.bench.inject(faults.PositionFrozen("lvdt"))
+    far.bench.inject(fault)
     far.plant.reading["position"] = 0.2
-    assert far.sync(POSITION) == HEALTHY
-    far.bench.clear(faults.PositionFrozen("lvdt"))
+    frames = [bytes.fromhex(far.sync(POSITION)) for _ in range(4)]
+    assert {int.from_bytes(frame[:4], "little", signed=True) for frame in frames} == {raw, raw + 1}
+    assert {frame[4:].hex() for frame in frames} == {HEALTHY[8:]}
+    far.bench.clear(fault)
     assert far.sync(POSITION) == "d0ad0e00000000"
 
 

@@ -156,3 +156,18 @@ def test_effects_can_be_switched_on_and_off_while_it_runs(start: Any, client: An
     assert set_parameter(client, "extra_effects", "").successful
     wait_until(lambda: states[-1].velocity[0] > 5e-3, "the piston to move again")
     wait_until(lambda: "deadband" not in health["effects"], "the effects gone from the diagnostics")
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.05])
+def test_the_simulator_brakes_before_its_stops_only_where_it_is_asked_to(speed: float) -> None:
+    from hydraulic_sim.nodes.simulator import Simulator
+
+    plant = Simulator()
+    values = {spec.name: spec.default for spec in plant.parameters()}
+    plant.configure({**values, "rate": 1000.0, "impact_speed": speed})
+    ends = plant.ends_of_travel()
+    if not speed:
+        assert ends is None
+        return
+    assert ends is not None and (ends.low, ends.high, ends.impact_speed) == (-0.762, 0.762, speed)
+    assert 0.44 < ends.full_speed < 0.7, "with the whole pressure over one land"

@@ -83,7 +83,7 @@ def write_bus(path: Path) -> None:
     bus = yaml.load(SHIPPED.read_text(encoding="utf-8"))
     bus["channel"], bus["rate"] = CHANNEL, RATE
     bus["master"].update(heartbeat=0.2, lost_after=PATIENCE_S)
-    bus["limits"].update(frozen_time=PATIENCE_S, velocity=100.0)
+    bus["limits"].update(frozen_travel=1.0, velocity=100.0)
     bus["monitoring"].update(frames_within=0.95, missed_cycles=500, heartbeats=60)
     bus["monitoring"].update(sync_gap=PATIENCE_S, state_change=PATIENCE_S)
     for node in bus["nodes"].values():

@@ -16,6 +16,7 @@ from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_plant_node.nodes.running import run_plant
 from hydraulic_plant_node.plant_backend import PlantBackend
+from hydraulic_plant_node.travel_limits import EndsOfTravel
 
 PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("bus", "bench", "bus file, or the name of a shipped one"),
@@ -59,6 +60,7 @@ class CanPlant(PlantBackend):
         bus = load_bus(values["bus"])
         bus = replace(bus, rate=values["rate"] or bus.rate)
         self.hardware_id = f"can: {bus.name}"
+        self.unprotected = bus.unprotected
         self._bench = Bench(bus, values["interface"], values["channel"], values["lockstep"])
         self._priority = min(values["realtime_priority"] + 1, 98) if values["realtime_priority"] else 0
         self._bench.boot()
@@ -68,6 +70,10 @@ class CanPlant(PlantBackend):
     def sampling_rate(self, values: Mapping[str, Any]) -> float:
         """That of the SYNC."""
         return self._configured.bus.rate
+
+    def ends_of_travel(self) -> EndsOfTravel | None:
+        """What the bus file says about braking."""
+        return self._configured.bus.limits.braking
 
     def activate(self) -> None:
         """All devices operational, the valve DISABLED at 0 V.

@@ -147,7 +147,7 @@ class PositionJump(_Switch):
 
 @dataclass(frozen=True)
 class PositionFrozen(_Switch):
-    """The LVDT repeats its last position."""
+    """The LVDT repeats its last position, but for a count that flickers."""
 
     attribute, off = "frozen", False
     profiles = (406,)
@@ -155,7 +155,7 @@ class PositionFrozen(_Switch):
 
 @dataclass(frozen=True)
 class PositionStuck(_Switch):
-    """The LVDT reads the position ``at`` [m]; by default one outside of any stroke."""
+    """The LVDT reads the position ``at`` [m]; by default one outside of any stroke; a count flickers."""
 
     attribute, off = "stuck_at", None
     profiles = (406,)

@@ -29,11 +29,17 @@ class Lvdt(Sensor):
         self.frozen = False
         self.stuck_at: float | None = None
         self.area = 0
+        self._raw = 0
+        self._flicker = 0  # the last count of a converter that measures nothing new
         self._sign, self._zero = wiring.mounting("position")
 
     def sense(self, reading: Reading) -> None:
         """See `Device.sense`."""
+        if self.frozen or self.stuck_at is not None:
+            self._flicker ^= 1
         if self.frozen:
+            self.set(0x6004, 0, self._raw + self._flicker)
+            self.set(0x6400, 1, self._work_area(self._raw) | self.area)
             return
         position = (reading.position if self.stuck_at is None else self.stuck_at) + self.jump
         raw = round(self._sign * (position - self._zero) / (_POSITION_STEP * self.get(0x6005, 1)))
@@ -41,10 +47,13 @@ class Lvdt(Sensor):
         self.set(0x6503, 0, POSITION_ERROR if self._broken else 0)
         if self._broken:
             return
-        self.set(0x6004, 0, raw)
+        self._raw = raw
+        self.set(0x6004, 0, raw + (self._flicker if self.stuck_at is not None else 0))
         self.set(0x6030, 1, round(self._sign * speed / (_SPEED_STEP * self.get(0x6005, 2))))
-        state = ABOVE if raw > self.get(0x6402, 1) else BELOW if raw < self.get(0x6401, 1) else 0
-        self.set(0x6400, 1, state | self.area)
+        self.set(0x6400, 1, self._work_area(raw) | self.area)
+
+    def _work_area(self, raw: int) -> int:
+        return ABOVE if raw > self.get(0x6402, 1) else BELOW if raw < self.get(0x6401, 1) else 0
 
     def refuse(self, index: int, sub: int, value: int) -> int:
         """A step of 0 measures nothing."""

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_interfaces.samples import NAN, PlantSample
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_plant_node.nodes.running import run_plant
 from hydraulic_plant_node.plant_backend import BackendError, PlantBackend
+from hydraulic_plant_node.travel_limits import EndsOfTravel
 from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
@@ -35,6 +38,7 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec("model", DEFAULT_MODEL, "model file, or the name of a preset"),
     ParameterSpec("initial_position", 0.0, "where the piston starts, 0 is mid-stroke", "m", -100.0, 100.0),
     ParameterSpec("limit_margin", 1e-3, "limit switches close this far before the stops", "m", 0.0, 1.0),
+    ParameterSpec("impact_speed", 0.0, "at most at a stop: drives are braked before it; 0: not", "m/s", 0.0, 1.0),
     ParameterSpec("noise_seed", 0, "seed of all sensor noise", "", 0, 2**31 - 1),
     ParameterSpec("publish_clock", False, "publish /clock: everybody else follows with use_sim_time"),
     ParameterSpec("real_time_factor", 1.0, "simulated per wall second, with publish_clock", "1", 0.01, 100.0),
@@ -73,6 +77,7 @@ class Simulator(PlantBackend):
             )
         self._start = values["initial_position"]
         self._switch_at = half - values["limit_margin"]
+        self._impact_speed = values["impact_speed"]
         # Compiles or loads the kernels too, which must not happen in the first cycle.
         self._live = LivePlant(Plant.at_rate(model, values["rate"]))
         seeds = np.random.SeedSequence(values["noise_seed"]).spawn(5)
@@ -98,6 +103,22 @@ class Simulator(PlantBackend):
         sensors = {"position": [self._position], "velocity": [self._velocity], "pressure": self._pressures}
         for sensor in sensors[quantity]:
             setattr(sensor, what, value)
+
+    def ends_of_travel(self) -> EndsOfTravel | None:
+        """Those of the model, where `impact_speed` asks for it.
+
+        :raises BackendError: a model without a valve, whose speed follows from no data.
+        """
+        if not self._impact_speed:
+            return None
+        model = self._live.plant.model
+        if model.kind != "hydraulic":
+            raise BackendError(f"impact_speed: the speed of {model.name} does not follow from its data; allowed: 0")
+        half, area = 0.5 * model.value("stroke"), min(model.value("piston_area_a"), model.value("piston_area_b"))
+        drop = model.value("supply_pressure") - model.value("tank_pressure")
+        flow = model.value("valve_flow") * math.sqrt(drop / model.value("valve_drop"))  # all of it over one land
+        full_speed = flow / area * DRIVE_LIMIT_V / model.value("drive_limit")
+        return EndsOfTravel(-half, half, self._impact_speed, full_speed)
 
     def activate(self) -> None:
         """Start from rest at the initial position."""

@@ -12,6 +12,7 @@ Rules, the same for a simulated and a real actuator:
 - A stop (emergency or fault) is latched until `reset`. Reset leaves the gate disabled: moving again takes
   `enable`.
 - While disabled or stopped the drive is 0 V and commands are refused, so that none waits for the enable.
+- What is applied may be less than what is held: `limits` know where the piston is (slew, braking before the ends).
 - Enabling, disabling and stopping each take the held drive away, also where one undoes the other before the next
   cycle: what was commanded before does not move anything after.
 
@@ -26,6 +27,7 @@ from enum import Enum
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V, WATCHDOG_S
 from hydraulic_interfaces.samples import Command
+from hydraulic_plant_node.travel_limits import TravelLimits
 
 
 class Verdict(Enum):
@@ -67,6 +69,7 @@ class CommandGate:
         self.stop_reason = ""
         self.last_problem = ""
         self.rivalled = ""
+        self.limits: TravelLimits | None = None
         self._source = ""
         self._number: int | None = None
         self._stamps_ns: dict[str, int] = {}
@@ -126,6 +129,8 @@ class CommandGate:
     def forget(self) -> None:
         """Begin at 0 V without a source; for the thread of `accept` and `drive`, before its first cycle."""
         self._release()
+        if self.limits is not None:
+            self.limits.forget()
 
     def age(self, now_ns: int) -> float:
         """Seconds since the last obeyed command arrived; NaN when no source is in command."""
@@ -159,7 +164,7 @@ class CommandGate:
         return Verdict.MALFORMED
 
     def drive(self, now_ns: int) -> float:
-        """The drive to apply now, V: always finite and within the limits."""
+        """The drive to apply in this cycle, V: always finite and within the limits."""
         self._follow_changes()
         if self._heard_ns is not None and not self._in_command(now_ns):
             # Only a silence that takes a drive away from an enabled actuator is a fault of the source.
@@ -167,7 +172,12 @@ class CommandGate:
             self._release()
         if self.stop_reason or not self.enabled:
             self._release()
-        return self._drive
+        return self._drive if self.limits is None else self.limits.limited(self._drive)
+
+    def observe(self, position: float) -> None:
+        """The piston was at ``position`` [m], NaN where nobody knows; for the thread of `drive`, after each sample."""
+        if self.limits is not None:
+            self.limits.observe(position)
 
     def _judge(self, command: Command, now_ns: int, number: int | None, alone: bool) -> Verdict:
         age_ns = now_ns - command.stamp_ns

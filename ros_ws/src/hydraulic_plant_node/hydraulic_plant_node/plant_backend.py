@@ -9,6 +9,7 @@ from typing import Any
 from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_plant_node.travel_limits import EndsOfTravel
 
 
 class BackendError(HydraulicError, RuntimeError):
@@ -36,6 +37,9 @@ class PlantBackend(ABC):
     warning: str = ""
     """What the user should know although nothing has to stop."""
 
+    unprotected: Sequence[str] = ()
+    """Protections that this plant does without, because somebody said so: shown at level WARN as long as it runs."""
+
     fault: str = ""
     """What is wrong with the plant while it is wrong: the node then holds 0 V until `reset`."""
 
@@ -61,6 +65,10 @@ class PlantBackend(ABC):
     def sampling_rate(self, values: Mapping[str, Any]) -> float:
         """Rate of the steps, Hz; asked after `configure`, with the same values."""
         return float(values["rate"])
+
+    def ends_of_travel(self) -> EndsOfTravel | None:
+        """How drives are limited before the stops; asked after `configure`. None: they are not."""
+        return None
 
     def description(self) -> Mapping[str, Any]:
         """What this plant is, as plain data; asked after `configure`, published, and kept with every record."""

@@ -188,7 +188,9 @@ class PlantLoop:
             if timing.own_clock:
                 ports.publish_clock(stamp + (behind - lost) * timing.period_ns)
             drive = self._drive(now)
-            for _ in range(behind - lost + 1):
+            for made_up in range(behind - lost + 1):
+                if made_up:
+                    drive = self._gate.drive(now)  # the limits of each instant
                 self._sample(first_stamp + slot * timing.period_ns, drive)
                 slot += 1
         wait(origin + round(slot * wall_period))
@@ -223,6 +225,7 @@ class PlantLoop:
         if sample is None:
             self.lost += 1
             return False
+        self._gate.observe(sample.position)
         self._ports.publish(sample)
         self.drive = sample.drive
         self.last_stamp_ns = sample.stamp_ns

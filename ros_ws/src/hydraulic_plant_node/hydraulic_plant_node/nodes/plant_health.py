@@ -59,8 +59,10 @@ class PlantHealth:
             return self._status("plant", ERROR, f"stopped until reset: {gate.stop_reason}", values)
         if self._backend.warning:
             return self._status("plant", WARN, self._backend.warning, values)
-        enabled = "enabled" if gate.enabled else "not enabled"
-        return self._status("plant", OK, f"{state}, {enabled}", values)
+        text = f"{state}, {'enabled' if gate.enabled else 'not enabled'}"
+        if self._backend.unprotected and state != "unconfigured":
+            return self._status("plant", WARN, f"{text}, without {', '.join(self._backend.unprotected)}", values)
+        return self._status("plant", OK, text, values)
 
     def _command(self, state: str, loop: PlantLoop | None, now_ns: int, not_heard: str) -> DiagnosticStatus:
         gate = self._gate
@@ -76,6 +78,10 @@ class PlantHealth:
             "not_heard": not_heard,
             **counts,
         }
+        braked = 0
+        if limits := gate.limits:
+            values |= {"allowed_V": f"{limits.allowed():.4f}", "braked": limits.braked, "slewed": limits.slewed}
+            braked = self._moved("braked", limits.braked)
         timeouts = self._moved("timeouts", gate.timeouts)
         problems = self._moved("problems", sum(counts.values()) - counts["accepted"])
         if timeouts:
@@ -85,6 +91,8 @@ class PlantHealth:
             return self._status("command", WARN, f"{problems} commands {gate.last_problem}", values)
         if not_heard:
             return self._status("command", WARN, not_heard, values)
+        if braked:
+            return self._status("command", WARN, f"{braked} drives limited before the end of travel", values)
         if state == "active" and gate.enabled and not gate.source:
             return self._status("command", WARN, "no command: drive is 0 V", values)
         return self._status("command", OK, f"obeys {gate.source!r}" if gate.source else "no source", values)

@@ -27,6 +27,7 @@ from hydraulic_plant_node.nodes.plant_health import PlantHealth
 from hydraulic_plant_node.nodes.plant_ports import PlantPorts
 from hydraulic_plant_node.plant_backend import PlantBackend
 from hydraulic_plant_node.plant_loop import LoopTiming, PlantLoop
+from hydraulic_plant_node.travel_limits import TravelLimits
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS,
@@ -117,6 +118,8 @@ class PlantNode(LifecycleNode):
             period_ns = round(1e9 / self._backend.sampling_rate(values))
             priority = 0 if lockstep else values["realtime_priority"]  # nothing is gained by being in time
             self._timing = LoopTiming(period_ns, factor, own_clock, lockstep, priority)
+            ends = self._backend.ends_of_travel()
+            self.gate.limits = None if ends is None else TravelLimits(ends, 1e-9 * period_ns)
             self._late_parameters = [spec.name for spec in late]
             self._table.declare(late)
             for spec in late:

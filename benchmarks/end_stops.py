@@ -1,0 +1,167 @@
+"""How fast a piston meets its stop, whoever commands: random and hostile streams of commands through the command gate.
+
+    python benchmarks/end_stops.py [--streams 1000] [--seconds 3] [--seed 2026] [--unlimited]
+
+The limits are those of the shipped bus file, the pistons those of the shipped presets of the same bench, half of them
+as built. Most streams start near an end. Printed is the distribution of the speed at contact, per kind of stream; the
+exit code is 1 where one is beyond the impact speed of the bus file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+import hydraulic_bringup.demo
+from hydraulic_can_driver.bus_file import load_bus
+from hydraulic_interfaces.contract import DRIVE_LIMIT_V
+from hydraulic_interfaces.samples import Command
+from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.travel_limits import EndsOfTravel, TravelLimits
+from hydraulic_sim.live import LivePlant
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
+
+RATES_HZ = (500.0, 1000.0)
+AS_BUILT = Path(hydraulic_bringup.demo.__file__).parent / "models" / "as_built.yaml"
+MODELS = ("moog_mcr_m_1002_bench", str(AS_BUILT))
+NOISE_M = 2e-5
+MS = 1_000_000
+
+Stream = Callable[[float, float], float]
+"""Drive [V] by time [s] and the velocity [m/s] that is seen."""
+
+
+def constant(rng: np.random.Generator) -> Stream:
+    """Full drive into one end."""
+    drive = DRIVE_LIMIT_V * rng.choice([-1.0, 1.0])
+    return lambda t, v: drive
+
+
+def steps(rng: np.random.Generator) -> Stream:
+    """Random levels, held for 2 to 200 ms."""
+    levels, hold = rng.uniform(-DRIVE_LIMIT_V, DRIVE_LIMIT_V, 997), rng.uniform(0.002, 0.2)
+    return lambda t, v: float(levels[int(t / hold) % 997])
+
+
+def noise(rng: np.random.Generator) -> Stream:
+    """White noise, beyond the drive's limit, too."""
+    levels = rng.normal(0.0, DRIVE_LIMIT_V, 9973)
+    return lambda t, v: float(levels[round(t * 1e4) % 9973])
+
+
+def square(rng: np.random.Generator) -> Stream:
+    """A square wave around the resonance of oil and load, with an offset."""
+    frequency, amplitude, offset = rng.uniform(20.0, 80.0), rng.uniform(2.0, 10.0), rng.uniform(-5.0, 5.0)
+    return lambda t, v: offset + amplitude * math.copysign(1.0, math.sin(2.0 * math.pi * frequency * t))
+
+
+def pulses(rng: np.random.Generator) -> Stream:
+    """Pulses to one side around the resonance."""
+    frequency, side = rng.uniform(20.0, 80.0), rng.choice([-1.0, 1.0])
+    return lambda t, v: side * DRIVE_LIMIT_V * (math.sin(2.0 * math.pi * frequency * t) > 0.0)
+
+
+def run_up(rng: np.random.Generator) -> Stream:
+    """Away from an end for a moment, then into it."""
+    side, period = rng.choice([-1.0, 1.0]), rng.uniform(0.01, 0.3)
+    return lambda t, v: side * DRIVE_LIMIT_V * (1.0 if t % period > 0.3 * period else -1.0)
+
+
+def pump(rng: np.random.Generator) -> Stream:
+    """Pump the swing of the load by what is seen of its velocity, a few samples late, and lean to one side."""
+    side, late, lean = rng.choice([-1.0, 1.0]), int(rng.integers(0, 12)), rng.uniform(0.0, DRIVE_LIMIT_V)
+    seen: list[float] = []
+
+    def drive(t: float, v: float) -> float:
+        seen.append(v)
+        swing = seen[max(len(seen) - 1 - late, 0)] - sum(seen[-30:]) / len(seen[-30:])
+        return float(side * lean + DRIVE_LIMIT_V * math.copysign(1.0, swing))
+
+    return drive
+
+
+KINDS = (constant, steps, noise, square, pulses, run_up, pump)
+
+
+@lru_cache
+def plant(model: str, rate: float) -> Plant:
+    """The compiled plant of a model file."""
+    return Plant.at_rate(load_model(model), rate)
+
+
+def ends_of_the_shipped_bench() -> EndsOfTravel:
+    """What the shipped bus file says."""
+    ends = load_bus("bench").limits.braking
+    assert ends is not None
+    return ends
+
+
+def impact(seed: int, ends: EndsOfTravel, limited: bool = True, seconds: float = 3.0) -> tuple[str, float]:
+    """Kind of the stream, and the greatest speed [m/s] towards a stop in contact with it; 0 where it was not met."""
+    rng = np.random.default_rng(seed)
+    kind, rate = KINDS[rng.integers(len(KINDS))], float(rng.choice(RATES_HZ))
+    body = plant(str(rng.choice(MODELS)), rate)
+    near = rng.choice([-1.0, 1.0]) * (ends.high - 0.04 * rng.random() ** 2)
+    start = float(near if rng.random() < 0.7 else rng.uniform(ends.low, ends.high))
+    live = LivePlant(body, body.initial_state(position=start))
+    stream, gate = kind(rng), CommandGate()
+    gate.limits = TravelLimits(ends, 1.0 / rate) if limited else None
+    gate.enable(True)
+    velocity = greatest = 0.0
+    for i in range(round(seconds * rate)):
+        now = round(i * 1e9 / rate)
+        gate.accept(Command(now, "stranger", stream(i / rate, velocity)), now)
+        sample = live.step(gate.drive(now), 1.0 / rate)
+        gate.observe(sample.position + NOISE_M * rng.standard_normal())
+        velocity = sample.velocity
+        outwards = velocity * math.copysign(1.0, sample.position)
+        # Seen at the instant before contact, too: within it the stop brakes already.
+        if outwards > 0.0 and ends.high - abs(sample.position) <= 1.2 * outwards / rate:
+            greatest = max(greatest, outwards)
+    return kind.__name__, greatest
+
+
+def cost(ends: EndsOfTravel, count: int = 200_000) -> float:
+    """Time [s] of the limits per sample."""
+    limits = TravelLimits(ends, 1e-3)
+    begun = time.perf_counter()
+    for i in range(count):
+        limits.observe(0.7 + 1e-7 * i)
+        limits.limited(5.0)
+    return (time.perf_counter() - begun) / count
+
+
+def main() -> int:
+    """Print the distribution; 1 where a piston met its stop too fast."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--streams", type=int, default=1000)
+    parser.add_argument("--seconds", type=float, default=3.0)
+    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--unlimited", action="store_true", help="without the limits, for comparison")
+    options = parser.parse_args()
+    ends = ends_of_the_shipped_bench()
+    found: dict[str, list[float]] = {kind.__name__: [] for kind in KINDS}
+    for seed in range(options.seed, options.seed + options.streams):
+        kind, speed = impact(seed, ends, not options.unlimited, options.seconds)
+        found[kind].append(speed)
+    print(f"{'stream':10} {'runs':>5} {'contact':>8} {'p50 mm/s':>9} {'p99 mm/s':>9} {'max mm/s':>9}")
+    everything = [speed for speeds in found.values() for speed in speeds]
+    for name, speeds in {**found, "all": everything}.items():
+        met = 1e3 * np.array([speed for speed in speeds if speed > 0.0] or [0.0])
+        contacts = sum(speed > 0.0 for speed in speeds)
+        p50, p99 = np.quantile(met, [0.5, 0.99])
+        print(f"{name:10} {len(speeds):5} {contacts:8} {p50:9.1f} {p99:9.1f} {met.max():9.1f}")
+    print(f"allowed: {1e3 * ends.impact_speed:g} mm/s; the limits take {1e6 * cost(ends):.2f} us per sample")
+    return int(max(everything) > ends.impact_speed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
