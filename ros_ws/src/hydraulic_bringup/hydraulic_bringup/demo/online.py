@@ -41,7 +41,7 @@ FASTEST = 4.0  # plant seconds per second of a simulator in lockstep, where the 
 # A simulated actuator may be excited again after an abort, also behind virtual CAN devices.
 ATTEMPTS = 2
 _CLIENT = "hydraulic_bringup.nodes._graph_client"
-_START_S = 90.0  # the first start on a machine compiles the physics
+_START_S = 300.0  # the first start on a machine compiles the physics; a plant that dies is noticed at once
 _STEP_S = 60.0
 _STRETCHED = 20.0  # by how much a busy machine may stretch an experiment
 
