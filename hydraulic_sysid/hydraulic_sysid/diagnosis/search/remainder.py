@@ -11,7 +11,7 @@ from hydraulic_sim.arrays import Array
 
 from .holdout import Split
 
-NEGLIGIBLE = 0.003  # of the motion in a segment: no law of a library is that of a bench to three parts in a thousand
+NEGLIGIBLE = 0.005  # of the motion in a segment: no law of a library is that of a bench to five parts in a thousand
 
 
 @dataclass(frozen=True)
