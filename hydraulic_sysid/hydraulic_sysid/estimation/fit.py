@@ -29,7 +29,7 @@ _SETTLED = 1e-4  # share of the cost below which moving initial states on gains 
 _ROUNDS = 4  # times that they are moved at most
 _NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured pressures go further
 _TURNED = 0.8  # of the sum of squares where the directions of the initial states were taken: below, they are taken anew
-_TURNED_AT_LAST = 0.9999  # the same where a fit would end
+_TURNED_AT_LAST = 200.0  # least gains of a fit by which it has fallen, where a fit would end
 _MILD = 3.0  # residual over noise from which a robust loss counts less than the square
 
 
@@ -266,7 +266,7 @@ def fit_segments(
             begin, settings.most_steps - steps, settings.least_gain, settings.tolerance, accepted=accepted
         )
         steps += found.iterations
-        begin = found.point.turned_anew(_TURNED_AT_LAST)
+        begin = found.point.turned_anew(1.0 - _TURNED_AT_LAST * settings.least_gain)
         if begin is found.point or steps >= settings.most_steps:
             return Fit(found.point, found.converged, steps)
 

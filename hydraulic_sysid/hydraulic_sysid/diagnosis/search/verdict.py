@@ -33,6 +33,7 @@ MANY_SPIKES = 1e-4  # of all samples: more are a fault of the recording
 HANGS = 0.05  # of a parameter's value, from which it is said that it hangs on the data sheet
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
+VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave
 UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
 SMALL = 1.2  # mean square over noise below which more may be left …
@@ -69,8 +70,12 @@ class Verdict:
 
 
 def conclusive(result: SearchResult) -> SearchResult:
-    """The search without its effects where they leave much and the drive is not known well enough to blame physics."""
-    if result.added and drive_unknown(result) and kind_of(result, tied=False) == OUTSIDE:
+    """The search without its effects where the drive is not known well enough to blame physics.
+
+    That is where they leave much, or where there was little left for them to explain.
+    """
+    vague = drive_unknown(result) and (result.base.misfit.variance < VAGUE or kind_of(result, tied=False) == OUTSIDE)
+    if result.added and vague:
         return replace(result, final=result.base, misfits={}, competing={})
     return result
 
