@@ -17,6 +17,7 @@ import yaml
 
 from hydraulic_bringup.entry.cli import verb_names
 from hydraulic_interfaces import contract
+from hydraulic_interfaces.conversions import interface_class
 from hydraulic_sysid.data.records import load_column_map, parse_column_map, read_records, shipped_maps
 from hydraulic_sysid.excitation import load_plan
 
@@ -134,6 +135,12 @@ def check_command(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
         package, file, *settings = words[2:]
         assert (ROOT / "ros_ws" / "src" / package / "launch" / file).is_file()
         assert {s.partition(":=")[0] for s in settings} <= launch_arguments()
+        return
+    if words[:3] == ["ros2", "topic", "pub"]:
+        name, kind, message = words[-3:]
+        topic = contract.find_topic(name)
+        assert kind == topic.type
+        assert set(yaml.safe_load(message)) <= set(interface_class(kind).get_fields_and_field_types())
         return
     assert words[0] == "./bench", words
     verb, *rest = words[1:]
