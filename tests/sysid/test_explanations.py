@@ -16,10 +16,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose
-from hydraulic_sysid.diagnosis.search.data_sheet import influences, released
 from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, split
-from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
-from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
 from hydraulic_sysid.report import render
 
 Array = np.ndarray
@@ -170,20 +167,3 @@ def test_of_very_long_records_blocks_are_left_out(model: Model) -> None:
     assert 0.4 * MOST_VALUES < sum(s.measured.size for s in long.segments) < 1.1 * MOST_VALUES
     (segments,), (fit,) = long.segments, long.fit
     assert 0.6 < fit.mean() < 0.72 and segments.first[-1] > 0.97 * time.size
-
-
-def test_how_far_a_size_moves_with_a_number_is_what_a_fit_with_the_other_number_finds(model: Model, runs) -> None:
-    bench, level = model.with_entry("coulomb_friction.level", free=True), "coulomb_friction.level"
-    parts, share = split(records(runs), (), bench, 0.5), 0.02  # of the tolerance: there it is linear
-
-    def fitted(at: Model) -> dict[str, float]:
-        return fit_segments(Plant(at), parts.to_fit, at.movable_keys(), FitSettings(tolerance=1e-2)).values
-
-    bench = bench.with_values(fitted(bench))
-    loose, tolerances = released(bench, bench)
-    (one,) = influences(Linearisation.of(loose, parts), tolerances, [level])
-    key, tolerance, change = one.numbers[0]
-    assert key == "supply_pressure" and tolerance == pytest.approx(0.06 * bench.value(key)) == tolerances[key]
-    assert abs(change) <= one.spread < 2.0 * abs(change)
-    low, high = (fitted(bench.with_values({key: bench.value(key) + s * share * tolerance})) for s in (-1, 1))
-    assert change == pytest.approx((high[level] - low[level]) / (2.0 * share), rel=0.1)

@@ -7,7 +7,7 @@ that have to move are named, by the cost of holding the others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,56 +116,6 @@ def suspects(at: Linearisation, given: Model, named: Sequence[str]) -> list[Devi
         if n != v
     ]
     return sorted(found, key=lambda d: -d.cost)
-
-
-@dataclass(frozen=True)
-class Influence:
-    """How far a fitted parameter would move [SI] with the numbers of the data sheet, each off by its tolerance.
-
-    ``numbers``: those that move it, the most first, each with its tolerance and the ``change`` that goes with it [SI];
-    ``spread``: all together, as independent of each other.
-    """
-
-    key: str
-    value: float
-    spread: float
-    numbers: tuple[tuple[str, float, float], ...]
-
-
-def released(model: Model, given: Model) -> tuple[Model, dict[str, float]]:
-    """A fitted model, the numbers that ``given`` fixes free where they are; and the tolerance of each [SI]."""
-    loose, tolerances = relaxed(given), {}
-    for key in NAMED:
-        entry = loose.entries.get(key)
-        if entry is None or entry == given.entries.get(key) or model.entry(key).free or entry.bounds is None:
-            continue
-        tolerances[key] = 0.5 * (entry.bounds[1] - entry.bounds[0])
-        model = model.with_entry(key, free=True, bounds=entry.bounds)
-    return model, tolerances
-
-
-def influences(at: Linearisation, tolerances: Mapping[str, float], keys: Sequence[str]) -> list[Influence]:
-    """Of the parameters ``keys``: to first order, all other free parameters following.
-
-    ``at``: of a `released` model, without priors.
-    """
-    every = at.parameters.keys
-    numbers = [k for k in tolerances if k in every]
-    place = [every.index(k) for k in numbers]
-    free = [i for i, k in enumerate(every) if k not in numbers and k not in at.parameters.at_bound]
-    information = at.normal.information
-    response = -inverse(information[np.ix_(free, free)]) @ information[np.ix_(free, place)]
-    found = []
-    for key in keys:
-        if key not in every or every.index(key) not in free:
-            continue
-        i = every.index(key)
-        scales = at.parameters.scales
-        changes = response[free.index(i)] * scales[i] / scales[place] * [tolerances[k] for k in numbers]
-        order = np.argsort(-np.abs(changes)).tolist()
-        rows = tuple((numbers[k], tolerances[numbers[k]], float(changes[k])) for k in order)
-        found.append(Influence(key, float(at.parameters.values[i]), float(np.linalg.norm(changes)), rows))
-    return found
 
 
 def significant(cost: float, count: int, variance: float) -> bool:

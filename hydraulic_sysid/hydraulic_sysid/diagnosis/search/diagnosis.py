@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from datetime import date
 from typing import Any
 
-import numpy as np
-
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
@@ -19,13 +17,11 @@ from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locat
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
-from .data_sheet import Deviation, Influence, influences, released
+from .data_sheet import Deviation
 from .document import document, with_balances
-from .holdout import Split
-from .linearisation import Linearisation
 from .misfit import explained
 from .nonparametric_curves import nonparametric_curves
-from .search import ENOUGH, HOPELESS, Search, SearchResult
+from .search import HOPELESS, Search, SearchResult
 from .uncertainty import Known, parameter_errors
 
 
@@ -71,8 +67,7 @@ def diagnose(
     curves = nonparametric_curves(suspect.linearisation, say) if outside else []
     known = parameter_errors(found.final.linearisation)
     found = replace(found, moved=[with_error(d, known) for d in found.moved])
-    hangs = [] if outside else _influences(found)
-    whole = {**document(found, verdict, known, curves, hangs), "check": check_rows(checked)}
+    whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
     done, alternatives = finished(found, known), verdicts.alternatives(found, verdict)
     before, after = found.base.model, found.final.model if found.added or found.moved else None
     suspected = None if not outside else before if proxy else after
@@ -107,20 +102,6 @@ def finished(found: SearchResult, known: Mapping[str, Known]) -> Model:
         )
         before = after
     return done
-
-
-def _influences(found: SearchResult) -> list[Influence]:
-    """How much the sizes of the effects that were added hang on numbers of the data sheet."""
-    model, tolerances = released(found.final.model, found.model)
-    keys = [k for k in model.movable_keys() if k.partition(".")[0] in found.added]
-    if not keys or not tolerances:
-        return []
-    try:
-        segments = found.split.some(ENOUGH)
-        part = Split(segments, [np.ones(len(s), dtype=bool) for s in segments])
-        return influences(Linearisation.of(model, part), tolerances, keys)
-    except SimulationError:
-        return []
 
 
 def _balances(

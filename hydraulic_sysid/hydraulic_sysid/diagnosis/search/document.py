@@ -12,7 +12,6 @@ from hydraulic_sysid.diagnosis.compare.document import model_document
 
 from . import verdict as verdicts
 from .candidates import subsystem
-from .data_sheet import Influence
 from .holdout import BLOCK, EVERY
 from .misfit import Misfit
 from .nonparametric_curves import NonparametricCurve
@@ -27,11 +26,7 @@ _CLEAR = 0.5  # share of what is left, from which a curve says where it is
 
 
 def document(
-    result: SearchResult,
-    verdict: Verdict,
-    known: Mapping[str, Known],
-    curves: Sequence[NonparametricCurve],
-    influences: Sequence[Influence] = (),
+    result: SearchResult, verdict: Verdict, known: Mapping[str, Known], curves: Sequence[NonparametricCurve]
 ) -> dict[str, Any]:
     """The document, still without balances (`with_balances`); arrays NumPy, SI."""
     final = result.final
@@ -70,10 +65,7 @@ def document(
             "level": "explained" if explained else "off" if outside else "close",
             "effects": verdict.possible,
             "subsystem": verdicts.place(result, verdict, curves),
-            "text": " ".join(
-                [verdicts.sentences(result, verdict, curves), *verdicts.influence_sentences(result, influences)]
-            )
-            + verdicts.warning(verdict.possible, imitations),
+            "text": verdicts.sentences(result, verdict, curves) + verdicts.warning(verdict.possible, imitations),
             "imitated": imitations,
         },
         "residual": {
@@ -107,16 +99,6 @@ def document(
                 "instead": list(d.instead),
             }
             for d in result.moved
-        ],
-        "data_sheet_influence": [
-            {
-                "key": i.key,
-                "unit": result.model.parameter(i.key).unit,
-                "value": i.value,
-                "spread": i.spread,
-                "numbers": [{"key": k, "tolerance": t, "change": c} for k, t, c in i.numbers],
-            }
-            for i in influences
         ],
         "recording": {
             "faults": [

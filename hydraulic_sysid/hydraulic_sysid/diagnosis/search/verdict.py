@@ -14,7 +14,6 @@ from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
-from .data_sheet import Influence
 from .drive_faults import DriveHypothesis
 from .nonparametric_curves import NonparametricCurve
 from .remainder import Remainder, negligible
@@ -30,7 +29,6 @@ RECORDING = "recording"
 OUTSIDE = "outside the library"
 
 MANY_SPIKES = 1e-4  # of all samples: more are a fault of the recording
-HANGS = 0.05  # of a parameter's value, from which it is said that it hangs on the data sheet
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
 VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave
@@ -245,22 +243,6 @@ def data_sheet_sentences(result: SearchResult) -> list[str]:
         other = f" {_and(d.instead)} would explain the same: these data cannot distinguish them." if d.instead else ""
         found.append(f"{d.key} is {quantity(d.value, unit, 4, error=d.standard_error)}, {said}.{other}")
     return found
-
-
-def influence_sentences(result: SearchResult, found: Sequence[Influence]) -> list[str]:
-    """How much hangs on the data sheet: how far sizes of effects move with its numbers, each within its tolerance."""
-    said = []
-    for one in found:
-        if one.spread < HANGS * abs(one.value) or result.model.parameter(one.key).null is None:
-            continue
-        unit = result.model.parameter(one.key).unit
-        most = [(k, t) for k, t, change in one.numbers if abs(change) > 0.5 * abs(one.numbers[0][2])][:3]
-        by = _and([f"{k} (± {quantity(t, result.model.parameter(k).unit)})" for k, t in most])
-        said.append(
-            f"{one.key} of {quantity(one.value, unit)} hangs on the data sheet: within the tolerances of its numbers "
-            f"it moves by {quantity(one.spread, unit, 2)}, most with {by}."
-        )
-    return said
 
 
 def recording_sentences(result: SearchResult) -> list[str]:
