@@ -51,9 +51,9 @@ def arrays(states: list[Any]) -> dict[str, np.ndarray]:
 def test_the_topics_carry_what_the_model_computes(start: Any, client: Any, wait_until: Any) -> None:
     states, pressures = client.collect("state"), client.collect("pressure_a")
     start("initial_position:=0.1", autostart=False)
-    client.state()
+    assert client.change_state("configure")
     wait_until(lambda: client.node.count_publishers("/actuator/state") == 1, "a publisher of state")
-    assert client.change_state("configure") and client.change_state("activate")
+    assert client.change_state("activate")
     wait_until(lambda: states, "a state")
     source = client.source("hand", 2.0)
     wait_until(lambda: states[-1].effort[1] == 2.0, "the drive")
