@@ -1,0 +1,83 @@
+"""Segments that begin at rest, where dry friction holds the piston with a force that nothing shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hydraulic_sim.model import Model
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
+from hydraulic_sysid.estimation.segments import Segments, cut
+from hydraulic_sysid.estimation.shooting import Shooting
+
+DT, SECONDS = 1e-3, 16.0
+NOISE = {"position": 5e-6, "pressure_a": 4e3, "pressure_b": 4e3}
+
+
+@pytest.fixture(scope="module")
+def model(compiled_physics: None) -> Model:
+    return load_model("sample_bench").with_values({"coulomb_friction.level": 3000.0})
+
+
+def rests(model: Model, quiet: float = 1.0) -> list[Segments]:
+    """Short steps with rests between: the piston stops with its bristles bent, one way or the other.
+
+    ``quiet``: of the noise, how much there is.
+    """
+    time = DT * np.arange(round(SECONDS / DT))
+    height = np.random.default_rng(3).choice([-4.0, -2.5, 2.5, 4.0], size=int(SECONDS / 0.8) + 1)
+    drive = np.where(time % 0.8 < 0.15, height[(time / 0.8).astype(int)], 0.0)
+    run, draw = Plant(model).simulate(drive, DT), np.random.default_rng(1)
+    channels = {c: run[c] + quiet * std * draw.standard_normal(time.size) for c, std in NOISE.items()}
+    return cut([Record.sampled("rests", DT, {"drive": drive, **channels})], "hydraulic", 0.5)
+
+
+@pytest.fixture(scope="module")
+def segments(model: Model) -> list[Segments]:
+    return rests(model)
+
+
+def worst(point: FitPoint) -> float:
+    """Largest mean square of a segment."""
+    return max(
+        float(np.max(np.sum(p.residual**2, axis=1) / s.counted))
+        for p, s in zip(point.projections, point.shooting.segments, strict=True)
+    )
+
+
+def test_a_segment_that_is_held_by_dry_friction_does_not_ring(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    segments = rests(model, quiet=0.1)
+    freed = worst(FitPoint.begin(Plant.for_fits(model), segments, ()).at_rest())
+    monkeypatch.setattr(Shooting, "freed", lambda self, plant, states, projections: (states, projections))
+    stuck = worst(FitPoint.begin(Plant.for_fits(model), segments, ()).at_rest())
+    assert stuck > 3.0
+    assert freed < 0.6 * stuck
+
+
+def test_without_dry_friction_nothing_is_sought(model: Model, segments: list[Segments]) -> None:
+    plant = Plant.for_fits(model.without_effect("coulomb_friction"))
+    assert not plant.has_dry_friction and Plant(model).has_dry_friction
+    begin = FitPoint.begin(plant, segments, ())
+    assert all(a is b for a, b in zip(begin.freed().initial_states, begin.initial_states, strict=True))
+
+
+def test_longer_steps_leave_an_error_far_below_the_noise(model: Model, segments: list[Segments]) -> None:
+    (s,), coarse = segments, Plant.for_fits(model)
+    begin = FitPoint.begin(coarse, segments, ()).initial_states[0]
+    runs = [p.predict(s.record["drive"], DT, s.first, s.samples - 1, begin) for p in (coarse, Plant(model, 1e-4, 0.2))]
+    for channel, std in NOISE.items():
+        error = runs[0][channel] - runs[1][channel]
+        assert np.sqrt(np.mean(error**2)) < 0.05 * std, channel
+
+
+def test_directions_that_are_kept_lead_to_the_same_minimum(model: Model, segments: list[Segments]) -> None:
+    """Those of the initial states are taken anew at the end, so that fitting on gains nothing."""
+    key = "viscous_friction.coefficient"
+    plant = Plant.for_fits(model.with_values({key: 0.8 * model.value(key)}))
+    found = fit_segments(plant, segments, [key], FitSettings())
+    again = fit_segments(plant.with_parameters(found.values), segments, [key], FitSettings())
+    assert again.values[key] == pytest.approx(found.values[key], rel=1e-3)
+    assert again.cost == pytest.approx(found.cost, rel=1e-4)
