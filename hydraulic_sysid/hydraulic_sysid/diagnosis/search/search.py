@@ -221,7 +221,7 @@ class Search:
             found = min((self.with_fault(base, f) for f in near), key=lambda f: f.misfit.total)
             if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
-            self.faults.append(found.fault)
+            self.faults = together(self.faults, found.fault)
             self.split = found.split
             base = self.judged(found.state)
         return base if base.scores else self.rounded(base)
@@ -472,6 +472,13 @@ class Search:
             model = model.with_effect(name, {p: final.model.value(f"{name}.{p}") for p in own})
             found[name] = self.state(model).misfit
         return {**found, **{name: final.misfit for name in order[-1:]}}
+
+
+def together(faults: Sequence[RecordingFault], found: RecordingFault) -> list[RecordingFault]:
+    """Faults with one more, which is more of the same where the same fault of a channel's timing was found before."""
+    same = [f for f in faults if f.hypothesis is found.hypothesis and not f.linear]
+    more = [replace(found, size=f.size + found.size, reduction=f.reduction + found.reduction) for f in same]
+    return [*(f for f in faults if f not in same), *(more or [found])]
 
 
 def _observed(model: Model) -> list[str]:
