@@ -175,7 +175,7 @@ def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(
     node("controller", "autostart:=true", "gains:=npid", *PATIENT)
     wait_until(lambda: answered() > 100, "a controller that answers")
     output = tmp_path / "response.json"
-    sine = ("kind:=sine", "amplitude:=0.03", "frequency:=1.0", "cycles:=3")
+    sine = ("kind:=sine", "amplitude:=0.03", "frequency:=1.0", "cycles:=8")
     player = node("reference", "autostart:=true", "exit_when_done:=true", f"output:={output}", *PLAYS, *sine)
     wait_until(lambda: controller_says(heard).get("reference_m") != "none", "a reference")
     refused = set_parameter(client, "output", str(tmp_path / "thesis.txt"), "/actuator/reference")
@@ -189,9 +189,9 @@ def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(
     document = json.loads(output.read_text())
     response, switch = Response.from_document(document), 1e-9 * (switched_ns - document["start_ns"])
     error = np.abs(response.reference - response.position)
-    assert 1.5 < switch < 3.5, "in the middle of the sine"
+    assert 1.0 < switch < 7.0, "in the middle of the sine"
     before = error[(response.time > 0.5) & (response.time < switch - 0.6)]
-    after = error[(response.time > switch) & (response.time < 4.5)]
+    after = error[(response.time > switch) & (response.time < 9.5)]
     assert np.sqrt(np.mean(before**2)) < np.sqrt(np.mean(after**2)), "it shows in the error"
     assert after.max() < 0.02, "and does not run away"
     assert np.all(np.isfinite(response.drive)) and np.abs(response.drive).max() <= 10.0

@@ -177,6 +177,14 @@ def test_one_publisher_may_lose_messages() -> None:
     assert one.accept(command(MS), MS, 12) is Verdict.ACCEPTED
 
 
+@pytest.mark.parametrize("bad", [Command(MS, "a", math.nan), Command(-60 * MS, "a", 1.0), Command(0, "a", 1.0)])
+def test_a_command_that_is_refused_for_what_it_says_is_not_missing_afterwards(bad: Command) -> None:
+    one = gate()
+    one.accept(Command(0, "a", 1.0), 0, 7, False)
+    assert not one.accept(bad, MS, 8, False).obeyed
+    assert one.accept(Command(2 * MS, "a", 2.0), 2 * MS, 9, False) is Verdict.ACCEPTED
+
+
 def test_disabled_is_zero_and_keeps_no_command_for_later() -> None:
     one = gate(enabled=False)
     assert one.accept(command(0), 0) is Verdict.DISABLED

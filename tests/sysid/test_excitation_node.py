@@ -226,7 +226,7 @@ def test_a_run_is_aborted_by_service_and_none_started_beside_it(bench: Bench) ->
 
 
 def test_another_source_is_not_disturbed(bench: Bench) -> None:
-    bench.plant()
+    bench.plant("-p", "watchdog:=5.0")  # a busy machine may hold the other source up
     diagnostics = bench.client.diagnostics()
     other = bench.client.source("controller", 0.5)
     bench.wait_until(lambda: diagnostics["source"] == "controller", "the other source in command")

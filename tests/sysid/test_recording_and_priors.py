@@ -11,7 +11,8 @@ import pytest
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES
+from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, RecordingFault
+from hydraulic_sysid.diagnosis.search.search import together
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations, minimise
 from hydraulic_sysid.estimation.noise import robust_noise_std
@@ -173,3 +174,11 @@ def test_of_one_pressure_in_each_record_both_may_be_late() -> None:
 def test_the_levels_of_a_command_are_no_noise_on_it() -> None:
     command = np.repeat([0.0, 3.0, 0.0, -3.0], 500)
     assert robust_noise_std(command, rounded=False) == 0.0 < robust_noise_std(command)
+
+
+def test_more_of_a_fault_that_was_found_before_is_one_fault() -> None:
+    low_pass, other = (next(h for h in HYPOTHESES if h.low_pass is way) for way in (True, False))
+    first, more = RecordingFault(low_pass, 4e-3, 1e-4, 100.0), RecordingFault(low_pass, 1e-3, 2e-4, 10.0)
+    late = RecordingFault(other, 2e-3, 1e-4, 50.0)
+    assert together([first, late], more) == [late, RecordingFault(low_pass, 5e-3, 2e-4, 110.0)]
+    assert together([first], late) == [first, late]

@@ -151,6 +151,8 @@ class CommandGate:
             self._source = command.source
             self._drive = min(max(command.drive, -self.limit), self.limit)
             self._heard_ns = now_ns
+        elif self._in_command(now_ns) and command.source == self._source and self._follows(number, alone):
+            self._number = number  # refused for what it says, it is still the next one of its publisher
         if verdict.obeyed or verdict is Verdict.STALE and self.enabled and self._source in ("", command.source):
             self._answered_ns = command.stamp_ns, self._answered_ns[0]
         if verdict is not Verdict.ACCEPTED:
