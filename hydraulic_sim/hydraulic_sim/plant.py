@@ -32,7 +32,7 @@ class Plant:
 
     Building one costs about 0.1 ms once the library is compiled in this process. Simulation releases the GIL.
     ``longest_step`` [s] is shortened where the physics is faster; ``refinement`` shortens the steps that follow the
-    oil through the lands as well (see `following`), above 1 it lengthens both.
+    oil through the lands as well (see `following`), above 1 it lengthens those that follow all else.
 
     :raises ModelError: a model that does not compose (two laws in one slot, missing base parameters).
     """
@@ -85,7 +85,7 @@ class Plant:
         """This plant with other parameter values (SI); nothing is compiled. For fits: bounds are not checked.
 
         The integrator's step stays as it is, so that a small change of a value changes results smoothly, unless
-        the physics becomes more than twice too fast for it.
+        the physics becomes more than twice too fast for it (or a little, where the step is long already).
 
         :raises ModelError: an unknown key.
         """
@@ -99,7 +99,7 @@ class Plant:
                 raise
         now = other._values()
         followed = rates.step(rates.fastest(self._active, now, self.model.kind), self.longest_step, self.refinement)
-        if followed < 0.5 * self.longest_step:
+        if followed < min(0.5 * self.refinement, 0.75) * self.longest_step:
             other.longest_step = followed
         other._shortest_dt = rates.shortest_sampling(self._active, now)
         return other
@@ -298,7 +298,7 @@ class Plant:
     @property
     def _turn(self) -> float:
         """How much of the rate of the oil through the lands one step may cover."""
-        return rates.STEP_TIMES_LANDS * self.refinement
+        return rates.STEP_TIMES_LANDS * min(self.refinement, 1.0)
 
     def advance(self, u: Array, dt: float, start: float, x: Array, memory: Array, out: Array) -> None:
         """Move the state ``x`` and ``memory`` on in place over ``u`` (N,) [V] from the time ``start`` [s].

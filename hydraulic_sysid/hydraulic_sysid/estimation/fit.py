@@ -279,7 +279,8 @@ def evaluate(model: Model, records: Sequence[Record], settings: FitSettings | No
 def loss(residual: Array, robust: bool) -> Array:
     """What each residual over noise counts: its square, or if ``robust`` less from about three on (soft L1)."""
     if not robust:
-        return residual**2
+        with np.errstate(over="ignore"):  # a run that leaves all bounds costs infinitely much
+            return np.asarray(residual**2)
     return 2.0 * _MILD**2 * (np.sqrt(1.0 + (residual / _MILD) ** 2) - 1.0)
 
 

@@ -98,7 +98,8 @@ class Shooting:
         moved = self.corrected(initial_states, before, [p.raw for p in before])
         states, projections = [], []
         for old, new, raw, p in zip(initial_states, moved, self.residuals(plant, moved), before, strict=True):
-            better = (np.sum(raw**2, axis=1) <= np.sum(p.raw**2, axis=1))[:, None]
+            with np.errstate(over="ignore"):  # a run that leaves all bounds is infinitely far off
+                better = (np.sum(raw**2, axis=1) <= np.sum(p.raw**2, axis=1))[:, None]
             states.append(np.where(better, new, old))
             projections.append(p.with_raw(np.where(better, raw, p.raw)))
         return states, projections

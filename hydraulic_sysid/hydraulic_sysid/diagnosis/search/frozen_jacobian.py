@@ -23,6 +23,7 @@ from hydraulic_sysid.estimation.parameters import Parameters
 from .candidates import between
 from .linearisation import Linearisation
 
+_ENDLESS = 1e100  # residual over noise of a run that has left all bounds
 _FLAT = 2e-4  # relative gain of a step that ends the refit
 _MOST_STEPS = 10
 _SHARES = (1.0, 0.5, 0.2, 0.05)  # of the predicted size, to start from
@@ -108,8 +109,8 @@ class FrozenPoint:
             raw = linearisation.point.shooting.residuals(located, initial_states)
         except SimulationError:
             return None
-        finite = all(np.isfinite(r).all() for r in raw)
-        return cls(linearisation, plant, parameters, initial_states, raw) if finite else None
+        bounded = all((np.abs(r) < _ENDLESS).all() for r in raw)
+        return cls(linearisation, plant, parameters, initial_states, raw) if bounded else None
 
     @cached_property
     def residual(self) -> list[Array]:
