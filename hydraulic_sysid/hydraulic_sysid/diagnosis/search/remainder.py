@@ -60,9 +60,9 @@ def remainders(split: Split, residual: Sequence[Array]) -> list[Remainder]:
     return found
 
 
-def negligible(found: list[Remainder]) -> bool:
-    """Whether what is left is below what any law of a library leaves."""
-    return bool(found) and all(r.share < NEGLIGIBLE for r in found)
+def negligible(found: list[Remainder], share: float = NEGLIGIBLE) -> bool:
+    """Whether what is left is below what any law of a library leaves, or below another ``share`` of the motion."""
+    return bool(found) and all(r.share < share for r in found)
 
 
 def spikes(split: Split) -> list[Spikes]:

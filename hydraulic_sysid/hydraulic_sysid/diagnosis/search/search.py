@@ -55,6 +55,7 @@ SUSPECTS = 3  # numbers of the data sheet that are tried at once
 QUIETER = 0.95  # of the noise before: what was judged by that is judged again
 RETIMED = 0.1  # sampling intervals by which a channel is less late than before: the same
 MOST_FAULTS = 3  # of the recording
+UNNOTICED = 0.003  # of the motion in a segment: what leaves less is no fault of the recording
 MOST_SIZES = 4  # times that the size of a fault is sought again, …
 SAME_SIZE = 0.03  # … until it changes by no more than this share
 FAR_OFF = 4.0  # mean square over noise from which a fit need not be finished
@@ -208,10 +209,12 @@ class Search:
         """A state with its candidates explored, and with every fault of the recording that explains more than they."""
         while base.misfit.variance - 1.0 > NOTHING_LEFT:
             base = self.explore(base)
-            if len(self.faults) == MOST_FAULTS or negligible(remainders(self.split, base.residual)):
+            left = remainders(self.split, base.residual)
+            if len(self.faults) == MOST_FAULTS or negligible(left, UNNOTICED):
                 break
             self.say("faults of the recording")
-            faults = recording_faults(base.linearisation)
+            # A disturbance is free enough to take up what laws leave, the timing of a channel is not.
+            faults = [f for f in recording_faults(base.linearisation) if not (f.linear and negligible(left))]
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
                 break
