@@ -24,7 +24,7 @@ def fastest(effects: Iterable[Effect], values: Mapping[str, float], kind: str) -
 
 
 def step(rate: float, longest: float, refinement: float = 1.0) -> float:
-    """The longest step [s] that follows a rate [1/s]; a ``refinement`` below 1 shortens it."""
+    """The longest step [s] that follows a rate [1/s]; ``refinement`` times as long as it would be."""
     return min(longest, refinement * STEP_TIMES_RATE / rate) if rate > 0.0 else longest
 
 

@@ -10,8 +10,6 @@ from hydraulic_sim.arrays import Array
 from .records.channels import HELD
 from .records.record import Record
 
-ALREADY = "decimation"
-
 
 def slower(record: Record, factor: int) -> Record:
     """Every ``factor``-th sample of a record.
@@ -26,9 +24,14 @@ def slower(record: Record, factor: int) -> Record:
         name: _mean(values, factor, count) if name in HELD else _smooth(values, factor)[: count * factor : factor]
         for name, values in record.channels.items()
     }
-    description = {**record.description, ALREADY: factor}
-    found = Record.sampled(record.name, factor * record.dt, channels, record.source, description, record.units)
-    return found
+    description = {**record.description, "decimation": factor}
+    return Record.sampled(record.name, factor * record.dt, channels, record.source, description, record.units)
+
+
+def spline(factor: int) -> Array:
+    """Weights of the cubic spline that is three times ``factor`` samples wide: three running means."""
+    mean = np.full(factor, 1.0 / factor)
+    return np.asarray(np.convolve(np.convolve(mean, mean), mean), dtype=np.float64)
 
 
 def _mean(values: Array, factor: int, count: int) -> Array:
@@ -36,8 +39,7 @@ def _mean(values: Array, factor: int, count: int) -> Array:
 
 
 def _smooth(values: Array, factor: int) -> Array:
-    mean = np.full(factor, 1.0 / factor)
-    kernel = np.convolve(np.convolve(mean, mean), mean)
+    kernel = spline(factor)
     if kernel.size % 2 == 0:  # an even factor: half a sample to either side
-        kernel = np.convolve(kernel, [0.5, 0.5])
+        kernel = np.asarray(np.convolve(kernel, [0.5, 0.5]), dtype=np.float64)
     return np.asarray(convolve1d(values, kernel, mode="nearest"))

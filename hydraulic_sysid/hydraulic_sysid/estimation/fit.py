@@ -28,8 +28,10 @@ from .shooting import Shooting
 _SETTLED = 1e-4  # share of the cost below which moving initial states on gains no more
 _ROUNDS = 4  # times that they are moved at most
 _NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured pressures go further
-_TURNED = 0.8  # of the sum of squares where the directions of the initial states were taken: below, they are taken anew
-_TURNED_AT_LAST = 200.0  # least gains of a fit by which it has fallen, where a fit would end
+_OUTDATED = (
+    0.8  # of the sum of squares where the directions of the initial states were taken: below, they are taken anew
+)
+_OUTDATED_AT_END = 200.0  # least gains of a fit by which it has fallen, where a fit would end
 _MILD = 3.0  # residual over noise from which a robust loss counts less than the square
 
 
@@ -52,7 +54,7 @@ class FitSettings:
 class FitPoint:
     """Parameters and initial states of a fit, and what is left there. Nothing of it changes: a step gives another.
 
-    ``turned``: sum of squares where the directions in which initial states act were taken.
+    ``directions_cost``: sum of squares where the directions in which initial states act were taken.
     """
 
     shooting: Shooting
@@ -60,7 +62,7 @@ class FitPoint:
     initial_states: list[Array]
     projections: list[Projection]
     robust: bool = False
-    turned: float = 0.0
+    directions_cost: float = 0.0
 
     @classmethod
     def begin(
@@ -122,7 +124,7 @@ class FitPoint:
         plant = shooting.plant.with_parameters(parameters.by_key)
         states = shooting.settled(plant, self.initial_states if initial_states is None else initial_states)
         point = FitPoint(shooting, parameters, *states, self.robust)
-        return replace(point, turned=point.cost)
+        return replace(point, directions_cost=point.cost)
 
     def moved(self, change: Array) -> FitPoint | None:
         """A change (P,) of the parameters away; None where the plant does not run there.
@@ -144,12 +146,12 @@ class FitPoint:
         states, projections = self.shooting.freed(self.plant, self.initial_states, self.projections)
         return replace(self, initial_states=states, projections=projections)
 
-    def turned_anew(self, least: float) -> FitPoint:
+    def with_new_directions(self, least: float) -> FitPoint:
         """This point, its directions of the initial states taken anew where they are old.
 
         :param least: of the sum of squares where they were taken, below which they are
         """
-        return self.settled(self.shooting, self.parameters) if self.cost < least * self.turned else self
+        return self.settled(self.shooting, self.parameters) if self.cost < least * self.directions_cost else self
 
     def reweighted(self) -> FitPoint:
         """This point, or the same parameters with unmeasured pressures freer, where the model comes nearer."""
@@ -255,7 +257,7 @@ def fit_segments(
         if progress is not None:
             progress(number, float(np.sqrt(point.cost / max(sum(p.raw.size for p in point.projections), 1))))
         again = point.reweighted()
-        return again if again is not point else point.turned_anew(_TURNED)
+        return again if again is not point else point.with_new_directions(_OUTDATED)
 
     begin = FitPoint.begin(plant, segments, keys, settings.robust, priors)
     if not keys:
@@ -266,7 +268,7 @@ def fit_segments(
             begin, settings.most_steps - steps, settings.least_gain, settings.tolerance, accepted=accepted
         )
         steps += found.iterations
-        begin = found.point.turned_anew(1.0 - _TURNED_AT_LAST * settings.least_gain)
+        begin = found.point.with_new_directions(1.0 - _OUTDATED_AT_END * settings.least_gain)
         if begin is found.point or steps >= settings.most_steps:
             return Fit(found.point, found.converged, steps)
 

@@ -75,7 +75,4 @@ class Projection:
 
     def subset(self, chosen: Mask) -> Projection:
         """Of the ``chosen`` (S,) segments alone."""
-        return Projection(
-            self.raw[chosen], self.basis[chosen], self.taken[chosen], self.correction[chosen],
-            self.log_determinant[chosen],
-        )  # fmt: skip
+        return Projection(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})

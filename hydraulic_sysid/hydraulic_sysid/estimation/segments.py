@@ -30,7 +30,7 @@ MEASURED = ("position", "pressure_a", "pressure_b")
 _STATES = ("position", "velocity", "pressure_a", "pressure_b")  # the first of every plant
 _FEWEST = 20  # samples of a segment
 _SMOOTHING = 15  # samples of the quadratic through which initial values are read
-_STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
+STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
 # Of the noise: how far an initial state may be off what was measured there. Sensors with an offset or a wrong scale are
 # off by far more than their noise, and the samples of the segment hold the initial state anyway.
 _PRIOR = {"position": 1000.0, "pressure_a": 200.0, "pressure_b": 200.0}
@@ -140,7 +140,7 @@ class Segments:
             if name in _STATES:
                 states[:, column] = np.where(np.isfinite(begin[:, column]), begin[:, column], states[:, column])
             elif name == "stick":
-                states[:, column] = np.clip(begin[:, _STATES.index("velocity")] / _STICK_SPEED, -1.0, 1.0)
+                states[:, column] = np.clip(begin[:, _STATES.index("velocity")] / STICK_SPEED, -1.0, 1.0)
             elif plant.layout.state_records[name].initial == "command":
                 states[:, column] = command[np.maximum(self.first - 1, 0)]
         return states

@@ -16,7 +16,7 @@ from hydraulic_sim.plant import Plant
 
 from .parameters import Parameters
 from .projection import Projection
-from .segments import Segments
+from .segments import STICK_SPEED, Segments
 
 T = TypeVar("T")
 
@@ -26,8 +26,7 @@ _LEAST_STEP = 0.1  # … or of so much of its scale
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel
 _VELOCITY_STEP = 1e-3  # m/s
 _PRESSURE_STEP = 1e5  # Pa, where the pressure is not measured
-_AT_REST = 2e-3  # m/s, below which dry friction may hold the piston with any part of its force, …
-_HOLDING = (-0.9, -0.5, 0.0, 0.5, 0.9)  # … of which these are tried
+_HOLDING = (-0.9, -0.5, 0.0, 0.5, 0.9)  # parts of its force with which dry friction may hold a piston at rest
 _STUCK = 1.5  # mean square of a segment, of the median, from which its start is sought anew
 
 
@@ -113,9 +112,11 @@ class Shooting:
         rings. Those that begin at rest, and leave clearly more than most, are started from several.
         """
         costs = [np.sum(p.residual**2, axis=1) / s.counted for p, s in zip(projections, self.segments, strict=True)]
-        limit = _STUCK * float(np.median(np.concatenate(costs)))
+        limit, velocity = _STUCK * float(np.median(np.concatenate(costs))), plant.state_names.index("velocity")
         done = [
-            self._freed(plant, i, states, p, (cost > limit) & (np.abs(self.initial_states[i][:, 1]) < _AT_REST))
+            self._freed(
+                plant, i, states, p, (cost > limit) & (np.abs(self.initial_states[i][:, velocity]) < STICK_SPEED)
+            )
             for i, (states, p, cost) in enumerate(zip(initial_states, projections, costs, strict=True))
         ]
         return [states for states, _ in done], [p for _, p in done]
@@ -130,7 +131,7 @@ class Shooting:
         for holding in _HOLDING:
             begin = part.initial_states[0].copy()
             begin[:, plant.state_names.index("stick")] = holding
-            begin[:, 1] = 0.0
+            begin[:, plant.state_names.index("velocity")] = 0.0
             (tried,), (other,) = part.settled(plant, [begin])
             better = np.sum(other.residual**2, axis=1) < np.sum(left.residual**2, axis=1)
             best, left = np.where(better[:, None], tried, best), left.with_segments(better, other.subset(better))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.data.slower import spline
 
 RATE = 200.0  # per second, of what is kept
 ORDER = 10  # of the autoregression: 50 ms, beyond the memory of a second difference at 200 per second
@@ -30,8 +31,7 @@ def decimate(values: Array, factor: int) -> Array:
     """Smooth ``(…, n)`` by the cubic spline of width 3·factor samples and keep every factor-th: ``(…, m)``."""
     if factor == 1:
         return values
-    mean = np.full(factor, 1.0 / factor)
-    kernel = np.convolve(np.convolve(mean, mean), mean)
+    kernel = spline(factor)
     return sliding_window_view(values, kernel.size, axis=-1)[..., ::factor, :] @ kernel
 
 

@@ -14,7 +14,6 @@ class Notices:
     def __init__(self, log: Callable[[str], object]) -> None:
         self._log = log
         self._seen: dict[str, float] = {}
-        self._counters: dict[str, int] = {}
 
     def tell(self, conditions: Mapping[str, str]) -> None:
         """To be called again and again with all conditions that stand now, texts by key."""
@@ -25,7 +24,14 @@ class Notices:
                 self._log(text)
             self._seen[key] = now
 
-    def moved(self, counter: str, value: int) -> bool:
-        """Whether a counter has another value than at the last call."""
-        before, self._counters[counter] = self._counters.get(counter, 0), value
-        return value != before
+
+class Counters:
+    """Counters by name, and by how much each has moved since it was looked at last."""
+
+    def __init__(self) -> None:
+        self._seen: dict[str, int] = {}
+
+    def moved(self, counter: str, value: int) -> int:
+        """By how much; one that starts anew has not moved by a negative number."""
+        before, self._seen[counter] = self._seen.get(counter, 0), value
+        return value - before if value >= before else value

@@ -16,7 +16,7 @@ from hydraulic_interfaces.qos import profile
 from hydraulic_node_utils.nodes import middleware
 from hydraulic_plant_node.command_gate import CommandGate, Verdict
 from hydraulic_plant_node.name_claim import NameClaim
-from hydraulic_plant_node.nodes.notices import Notices
+from hydraulic_plant_node.nodes.notices import Counters, Notices
 from hydraulic_plant_node.plant_backend import BackendError, PlantBackend
 from hydraulic_plant_node.run_marker import RunMarker
 
@@ -32,7 +32,7 @@ class PlantGuard:
 
     def __init__(self, node: Node, gate: CommandGate, backend: PlantBackend) -> None:
         self._node, self._gate, self._backend = node, gate, backend
-        self._notices = Notices(node.get_logger().warning)
+        self._notices, self._counters = Notices(node.get_logger().warning), Counters()
         self._domain = node.context.get_domain_id()
         self._claim = NameClaim(f"plant {self._domain} {node.get_fully_qualified_name()}")
         self._marker: RunMarker | None = None
@@ -104,9 +104,9 @@ class PlantGuard:
         self._watched += 1
         if self.not_heard:
             found["not heard"] = self.not_heard
-        if self._notices.moved("rival", gate.counts[Verdict.OTHER_PUBLISHER]):
+        if self._counters.moved("rival", gate.counts[Verdict.OTHER_PUBLISHER]):
             found["rival"] = f"a second publisher commands as {gate.rivalled!r} and is refused"
-        if self._notices.moved("order", gate.counts[Verdict.OUT_OF_ORDER]):
+        if self._counters.moved("order", gate.counts[Verdict.OUT_OF_ORDER]):
             found["order"] = "commands are refused: they are not stamped later than the last one of their source"
         self._notices.tell(found)
 

@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hydraulic_node_utils.nodes import diagnostics
 from hydraulic_node_utils.nodes.diagnostics import ERROR, OK, WARN
 from hydraulic_plant_node.command_gate import CommandGate, Verdict
+from hydraulic_plant_node.nodes.notices import Counters
 from hydraulic_plant_node.plant_backend import PlantBackend
 from hydraulic_plant_node.plant_loop import PlantLoop
 
@@ -22,7 +23,7 @@ class PlantHealth:
 
     def __init__(self, name: str, gate: CommandGate, backend: PlantBackend) -> None:
         self._name, self._gate, self._backend = name, gate, backend
-        self._seen: dict[str, int] = {}
+        self._counters = Counters()
 
     def urgent(self) -> tuple[object, ...]:
         """Changes of this value are worth a message at once."""
@@ -81,9 +82,9 @@ class PlantHealth:
         braked = 0
         if limits := gate.limits:
             values |= {"allowed_V": f"{limits.allowed():.4f}", "braked": limits.braked, "slewed": limits.slewed}
-            braked = self._moved("braked", limits.braked)
-        timeouts = self._moved("timeouts", gate.timeouts)
-        problems = self._moved("problems", sum(counts.values()) - counts["accepted"])
+            braked = self._counters.moved("braked", limits.braked)
+        timeouts = self._counters.moved("timeouts", gate.timeouts)
+        problems = self._counters.moved("problems", sum(counts.values()) - counts["accepted"])
         if timeouts:
             message = f"watchdog: no command for {gate.watchdog:g} s, drive is 0 V"
             return self._status("command", WARN, message, values)
@@ -117,13 +118,13 @@ class PlantHealth:
             "scheduling": loop.scheduling if loop.lockstep is None else "lockstep",
             "unanswered": loop.lockstep.given_up if loop.lockstep else 0,
         }
-        skipped = self._moved("skipped", report.skipped)
-        overruns = self._moved("overruns", report.overruns)
+        skipped = self._counters.moved("skipped", report.skipped)
+        overruns = self._counters.moved("overruns", report.overruns)
         if skipped:
             return self._status("timing", ERROR, f"{skipped} sampling instants skipped", values)
-        if lost := self._moved("lost", loop.lost):
+        if lost := self._counters.moved("lost", loop.lost):
             return self._status("timing", WARN, f"{lost} cycles without a sample", values)
-        if loop.lockstep and (given_up := self._moved("unanswered", loop.lockstep.given_up)):
+        if loop.lockstep and (given_up := self._counters.moved("unanswered", loop.lockstep.given_up)):
             return self._status("timing", WARN, f"{given_up} samples without an answer", values)
         if abs(step) > _CLOCK_STEP_S:
             message = f"wall clock was set by {step:.3f} s: re-activate to stamp with the new time"
@@ -131,12 +132,6 @@ class PlantHealth:
         if overruns:
             return self._status("timing", WARN, f"{overruns} deadlines overrun", values)
         return self._status("timing", OK, f"{report.rate:.1f} Hz", values)
-
-    def _moved(self, counter: str, value: int) -> int:
-        before = self._seen.get(counter, 0)
-        self._seen[counter] = value
-        # A counter that starts anew with a new run of the loop has not moved by a negative number.
-        return value - before if value >= before else value
 
     def _status(self, part: str, level: bytes, message: str, values: Mapping[str, Any]) -> DiagnosticStatus:
         return diagnostics.row(f"{self._name}: {part}", level, message, values, self._backend.hardware_id)
