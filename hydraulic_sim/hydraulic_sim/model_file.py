@@ -9,7 +9,7 @@ parameters:
 effects:
   coulomb_friction: {level: {value: 450 N, fit: free, bounds: [0 N, 2000 N]}}
   spool_dynamics: {}                  # on, with the library's defaults
-user_effects: [my_effect.py]          # relative to this file
+user_effects: [my_effect.py]          # relative to this file; Python, see `trust`
 history: []
 """
 
@@ -30,8 +30,9 @@ from .effect import Parameter, check_value
 from .errors import EffectError, ModelError
 from .model import KINDS, Entry, Model, check_bounds, check_within
 from .model_document import FORMAT, document, plain
-from .registry import library
-from .units import to_si
+from .registry import check_file, library
+from .trust import check_trusted
+from .units import check_quantity, to_si
 
 __all__ = ["Entry", "Model", "ModelError", "load_model", "presets", "save_model"]
 
@@ -107,6 +108,9 @@ class _Reader:
         if not isinstance(document, CommentedMap):
             raise ModelError(f"{path}: the file holds no mapping; expected the keys {', '.join(TOP_KEYS)}")
         self.document = document
+        self.library = library()
+        self.pending: frozenset[str] = frozenset()
+        """Effects of files that have not been run yet."""
 
     def fail(self, node: object, key: object, what: str) -> ModelError:
         try:
@@ -123,22 +127,49 @@ class _Reader:
         kind = top.get("plant", "hydraulic")
         if kind not in KINDS:
             raise self.fail(top, "plant", f"plant is {kind!r}; allowed: {', '.join(KINDS)}")
-        try:
-            files = tuple((self.path.parent / str(f)).expanduser().resolve() for f in self._list(top, "user_effects"))
-            self.library = library(files)
-        except EffectError as error:
-            raise self.fail(top, "user_effects", str(error)) from None
+        files = self._effect_files(top)
+        if files:  # they are Python: nothing of them is run before everything else has been found in order
+            self._read(top, kind, ())
+            self.pending = frozenset()
+            try:
+                self.library = library(files)
+            except EffectError as error:
+                raise self.fail(top, "user_effects", str(error)) from None
+        return self._read(top, kind, files)
+
+    def _effect_files(self, top: CommentedMap) -> tuple[Path, ...]:
+        """The effect files that the model names, all of which it may name."""
+        taken: dict[str, Path] = {}
+        for name in self._list(top, "user_effects"):
+            if not isinstance(name, str) or not name.isprintable():
+                raise self.fail(top, "user_effects", f"user_effects: expected names of files, found {name!r}")
+            file = (self.path.parent / name).resolve()
+            try:
+                check_trusted(file, self.path)
+                check_file(file)
+            except EffectError as error:
+                raise self.fail(top, "user_effects", str(error)) from None
+            known = self.library.source_file(file.stem) if file.stem in self.library else taken.get(file.stem)
+            if known:
+                what = f"{file}: an effect named {file.stem!r} is already defined in {known}"
+                raise self.fail(top, "user_effects", what)
+            taken[file.stem] = file
+        self.pending = frozenset(taken)
+        return tuple(taken.values())
+
+    def _read(self, top: CommentedMap, kind: str, files: tuple[Path, ...]) -> Model:
+        """The model; of effects that are pending only the form is checked, and they are left out."""
         entries: dict[str, Entry] = {}
         self._section(self._mapping(top, "parameters"), "", entries)
         effects = []
         for name, values in self._mapping(top, "effects").items():
             section = top["effects"]
-            if name not in self.library:
-                known = ", ".join(sorted(self.library))
+            if name not in self.library and name not in self.pending:
+                known = ", ".join(sorted({*self.library, *self.pending}))
                 raise self.fail(section, name, f"unknown effect {name!r}; the library has: {known}")
             if values is not None and not isinstance(values, CommentedMap):
                 raise self.fail(section, name, f"effect {name}: expected a mapping of parameters, found {values!r}")
-            if not self.library[name].always_on:
+            if name in self.library and not self.library[name].always_on:
                 effects.append(str(name))
             self._section(values or CommentedMap(), f"{name}.", entries)
         model = Model(
@@ -187,28 +218,44 @@ class _Reader:
         for name, raw in node.items():
             key = f"{prefix}{name}"
             try:
-                record = self.library.parameter(key)
-                entries[key] = self._entry(key, record, raw)
+                if prefix.rstrip(".") in self.pending:
+                    self._form(key, raw)
+                else:
+                    entries[key] = self._entry(key, self.library.parameter(key), raw)
             except (EffectError, ModelError) as error:
                 raise self.fail(node, name, str(error)) from None
 
-    def _entry(self, key: str, record: Parameter, raw: object) -> Entry:
+    def _form(self, key: str, raw: object) -> None:
+        """Check what can be said of an entry without knowing its parameter."""
         if not isinstance(raw, CommentedMap):
-            return Entry(check_value(record, to_si(raw, record.unit, key), key))  # type: ignore[arg-type]
+            check_quantity(raw, key)
+            return
+        self._fields(key, raw)
+        check_quantity(raw["value"], key)
+        for bound in raw.get("bounds") or ():
+            check_quantity(bound, f"{key} bounds")
+        if raw.get("standard_error") is not None:
+            check_quantity(raw["standard_error"], f"{key} standard_error")
+
+    def _fields(self, key: str, raw: CommentedMap) -> None:
         for inner in raw:
             if inner not in ENTRY_KEYS:
                 raise ModelError(f"{key} has no field {inner!r}; allowed: {', '.join(ENTRY_KEYS)}")
         if "value" not in raw:
             raise ModelError(f"{key}: no value")
-        fit = raw.get("fit")
+        fit, bounds = raw.get("fit"), raw.get("bounds")
         if fit not in (None, "free", "fixed"):
             raise ModelError(f"{key}: fit is {fit!r}; allowed: free, fixed")
-        bounds = raw.get("bounds")
+        if bounds is not None and (not isinstance(bounds, CommentedSeq) or len(bounds) != 2):
+            raise ModelError(f"{key}: bounds are {bounds!r}; expected [lowest, highest]")
+
+    def _entry(self, key: str, record: Parameter, raw: object) -> Entry:
+        if not isinstance(raw, CommentedMap):
+            return Entry(check_value(record, to_si(raw, record.unit, key), key))  # type: ignore[arg-type]
+        self._fields(key, raw)
+        fit, bounds, error = raw.get("fit"), raw.get("bounds"), raw.get("standard_error")
         if bounds is not None:
-            if not isinstance(bounds, CommentedSeq) or len(bounds) != 2:
-                raise ModelError(f"{key}: bounds are {bounds!r}; expected [lowest, highest]")
             bounds = check_bounds(key, record, (to_si(b, record.unit, f"{key} bounds") for b in bounds))
-        error = raw.get("standard_error")
         value = check_value(record, to_si(raw["value"], record.unit, key), key)
         check_within(key, record, value, bounds)
         return Entry(

@@ -119,10 +119,22 @@ def load_effect(path: Path) -> EffectFile:
     :raises EffectError: it is no effect file; the text names it.
     """
     path = path.expanduser().resolve()
-    if not path.is_file():
-        raise EffectError(f"{path}: there is no such effect file")
+    check_file(path)
     source = path.read_bytes()
     return EffectFile(_executed(path, source), path, _digest(source))
+
+
+def check_file(path: Path) -> None:
+    """Check what can be said of an effect file without running it.
+
+    :raises EffectError: it is not there, or its name cannot be an effect's.
+    """
+    if not path.is_file():
+        raise EffectError(f"{path}: there is no such effect file")
+    if path.suffix != ".py":
+        raise EffectError(f"{path}: an effect file is Python and ends in .py")
+    if not path.stem.isidentifier():
+        raise EffectError(f"{path}: an effect is named after its file, and {path.stem!r} is not a Python identifier")
 
 
 def _digest(content: bytes) -> str:
@@ -141,7 +153,7 @@ def _executed(path: Path, source: bytes) -> Effect:
     sys.modules[module.__name__] = module
     try:
         exec(compile(source, str(path), "exec"), module.__dict__)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise EffectError(f"{path}: {type(error).__name__}: {error}") from error
     return _named(module, path)
 
@@ -150,8 +162,6 @@ def _named(module: ModuleType, path: Path) -> Effect:
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):
         raise EffectError(f"{path}: defines no module constant EFFECT of type Effect")
-    if not path.stem.isidentifier():
-        raise EffectError(f"{path}: an effect is named after its file, and {path.stem!r} is not a Python identifier")
     return replace(effect, name=path.stem)
 
 

@@ -27,12 +27,26 @@ def to_si(value: float | int | str, unit: str, where: str = "value") -> float:
     :raises ModelError: a text that is no number with a unit, a unit of another dimension, an angle where there must be
         none (2 rad/s is not 2 Hz), NaN or infinity; the text names ``where``.
     """
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ModelError(f"{where}: {value!r} is not a number or a quantity such as '12.5 {unit}'")
+    _check_kind(value, f"12.5 {unit}", where)
     number = _from_text(value, unit, where) if isinstance(value, str) else float(value)
     if not math.isfinite(number):
         raise ModelError(f"{where}: {value!r} is not finite")
     return number
+
+
+def check_quantity(value: object, where: str = "value") -> None:
+    """Check that ``value`` is a number or a text of a number with a unit, whichever.
+
+    :raises ModelError: it is neither; the text names ``where``.
+    """
+    _check_kind(value, "12.5 mm", where)
+    if isinstance(value, str) and _QUANTITY.fullmatch(value) is None:
+        raise ModelError(f"{where}: {value!r} is not a quantity; expected for example '1.5 mm'")
+
+
+def _check_kind(value: object, example: str, where: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ModelError(f"{where}: {value!r} is not a number or a quantity such as '{example}'")
 
 
 def _from_text(text: str, unit: str, where: str) -> float:

@@ -17,6 +17,7 @@ from hydraulic_sim.catalogue import describe
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_sim.plant import Plant
+from hydraulic_sim.trust import VARIABLE
 
 LEAK = """
 from hydraulic_sim.effect import Effect, Parameter
@@ -124,9 +125,12 @@ def test_a_user_effect_joins_model_fit_and_catalogue_by_its_file_alone(workshop:
     assert "own_leak" not in registry.library()
 
 
-def test_the_file_is_found_relative_to_the_model_file(workshop: Workshop, tmp_path: Path) -> None:
+def test_the_file_is_found_relative_to_the_model_file(
+    workshop: Workshop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert "user_effects:\n- own_leak.py\n" in workshop.model_file.read_text()
     moved = save_model(load_model(workshop.model_file), tmp_path / "moved.yaml")
+    monkeypatch.setenv(VARIABLE, str(workshop.folder))
     assert load_model(moved).user_effects == (workshop.effect,)
     assert f"- {os.path.relpath(workshop.effect, tmp_path)}\n" in moved.read_text()
 

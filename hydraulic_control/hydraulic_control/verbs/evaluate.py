@@ -26,6 +26,7 @@ from hydraulic_control.verbs._cells import STEP_COLUMNS, step_cells
 from hydraulic_node_utils import cli, tables
 from hydraulic_node_utils.json_file import read_json
 from hydraulic_sim.model_file import load_model
+from hydraulic_sim.trust import add_trust_option
 
 EPILOG = """\
 examples:
@@ -47,6 +48,7 @@ def main(argv: list[str] | None = None) -> int:
         help=f"parameter files, or shipped ones: {', '.join(gains_file.shipped())} (default npid)",
     )
     parser.add_argument("--model", metavar="FILE", default="moog_mcr_m_1002_bench", help="model file or preset")
+    add_trust_option(parser)
     parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="linear_model.json of identify")
     parser.add_argument("--bench", metavar="JSON", nargs="+", default=[], help="responses that the node reference kept")
     parser.add_argument("--step", metavar="METRES", type=cli.positive, default=0.05, help="step (default 0.05)")

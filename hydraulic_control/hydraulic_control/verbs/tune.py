@@ -29,6 +29,7 @@ from hydraulic_control.verbs._cells import STEP_COLUMNS, step_cells
 from hydraulic_node_utils import cli, tables
 from hydraulic_node_utils.json_file import read_json
 from hydraulic_sim.model_file import load_model
+from hydraulic_sim.trust import add_trust_option
 
 EPILOG = """\
 examples:
@@ -43,6 +44,7 @@ def main(argv: list[str] | None = None) -> int:
     parser = cli.parser("hydraulic_control tune", __doc__.partition("\n")[0], EPILOG)
     parser.add_argument("--controller", choices=CONTROLLERS, default="npid", help="law to tune (default npid)")
     parser.add_argument("--model", metavar="FILE", default="moog_mcr_m_1002_bench", help="model file or preset")
+    add_trust_option(parser)
     parser.add_argument("--identified", metavar="JSON", nargs="+", default=[], help="linear_model.json of identify")
     parser.add_argument("--relay", metavar="JSON", help="result of the node relay, instead of one on the plant here")
     parser.add_argument("--relay-amplitude", metavar="V", type=cli.positive, default=0.5, help="default 0.5")

@@ -21,6 +21,7 @@ from typing import Any
 from rich.console import Console
 
 from hydraulic_node_utils import cli, tables
+from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import Record, read_all
 
@@ -97,8 +98,9 @@ def _without(value: Any, names: Sequence[str]) -> Any:
 
 
 def add_model_option(parser: argparse.ArgumentParser, what: str = "model file, or the name of a preset") -> None:
-    """``--model FILE``; read it with `load_model`."""
+    """``--model FILE``; read it with `load_model`. And ``--trust DIR``."""
     parser.add_argument("--model", metavar="FILE", required=True, help=what)
+    add_trust_option(parser)
 
 
 def add_record_options(parser: argparse.ArgumentParser, *, required: bool = True, window: bool = True) -> None:

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import load_model
+from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data.display import number
 from hydraulic_sysid.excitation import load_plan
 from hydraulic_sysid.linear import bandwidth
@@ -35,6 +36,7 @@ def main(argv: list[str] | None = None) -> int:
     parser = opt.parser("bandwidth", __doc__, EPILOG)
     opt.add_record_options(parser, required=False, window=False)
     parser.add_argument("--model", metavar="FILE", help="model file, or the name of a preset")
+    add_trust_option(parser)
     parser.add_argument("--probe", metavar="PLAN", help="play this plan on the model instead of linearising it")
     parser.add_argument("--position", metavar="M", type=float, default=0.0, help="of the piston (default: mid stroke)")
     opt.add_period_options(parser)

@@ -15,6 +15,7 @@ from typing import Any
 from rich.console import Console
 
 from hydraulic_node_utils import tables
+from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.display import number, span
 from hydraulic_sysid.diagnosis.next_experiment import NextExperimentError, competing, limits_of, next_experiment
@@ -41,6 +42,7 @@ def main(argv: list[str] | None = None) -> int:
         "--diagnosis", metavar="DIR", type=Path, help="folder of a diagnosis that names several effects"
     )
     models.add_argument("--model", metavar="FILE", nargs="+", help="files of the competing models, fitted, two or more")
+    add_trust_option(parser)
     opt.add_record_options(parser, required=False, window=False)
     parser.add_argument(
         "--noise", metavar="CHANNEL=SIGMA", nargs="+", default=[],

@@ -16,6 +16,7 @@ from rich.console import Console
 from hydraulic_node_utils import tables
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
+from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data.display import number, shown
 from hydraulic_sysid.linear.models import read_linear_model
 from hydraulic_sysid.linear.validation import SHAPES, Grid
@@ -39,6 +40,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--model", metavar="FILE", help="model file or preset of the nonlinear plant to play the grid to"
     )
+    add_trust_option(parser)
     parser.add_argument("--shapes", nargs="+", choices=list(SHAPES), default=list(SHAPES), help="default: all")
     parser.add_argument(
         "--amplitudes", metavar="V", type=float, nargs="+", default=[1.0, 2.0, 4.0], help="default 1 2 4"

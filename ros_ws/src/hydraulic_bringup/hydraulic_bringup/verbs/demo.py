@@ -19,6 +19,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from hydraulic_bringup.demo import offline, online
 from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import load_model
+from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data.display import number
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.verbs.compare import error_table
@@ -94,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--model", metavar="FILE", default=DATA_SHEET, help=f"model file or preset (default {DATA_SHEET})"
     )
+    add_trust_option(parser)
     parser.add_argument("--plant", choices=tuple(online.PLANTS), help="what is excited (default sim)")
     parser.add_argument("--out", metavar="DIR", type=Path, help="new folder of the run (default runs/<date>-demo)")
     parser.add_argument("--quick", action="store_true", help="experiments of a few seconds")

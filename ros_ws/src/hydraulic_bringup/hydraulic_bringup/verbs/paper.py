@@ -26,6 +26,7 @@ from hydraulic_bringup.verbs.demo import ProgressSteps, new_folder
 from hydraulic_node_utils import cli
 from hydraulic_sim.model_file import load_model, presets
 from hydraulic_sim.plant import Plant
+from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.excitation import Plan, load_plan
@@ -48,6 +49,7 @@ def main(argv: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = cli.parser("paper", __doc__)
     parser.add_argument("--model", metavar="FILE", default=DEFAULT, help=f"model file or preset (default {DEFAULT})")
+    add_trust_option(parser)
     parser.add_argument("--plant", choices=tuple(online.PLANTS), default="sim", help="what is excited (default sim)")
     how = parser.add_mutually_exclusive_group()
     how.add_argument("--quick", action="store_true", help="short records of the paper's band through the graph")

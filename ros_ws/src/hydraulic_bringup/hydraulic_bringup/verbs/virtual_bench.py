@@ -24,6 +24,7 @@ from hydraulic_can_driver.virtual.wiring import Event
 from hydraulic_node_utils import cli
 from hydraulic_plant_node.pacing import request_realtime
 from hydraulic_sim.model_file import load_model
+from hydraulic_sim.trust import add_trust_option
 
 READY = "ready:"
 Timed = tuple[InjectedFault, float, float]
@@ -129,6 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--channel", default="", help="channel of the interface: can0, vcan0, 239.74.163.2:43113")
     add("--rate", type=float, default=0.0, metavar="HZ", help="SYNCs per second, as the driver is set to")
     add("--model", default="moog_mcr_m_1002_bench", help="model file, or a preset's name (default: %(default)s)")
+    add_trust_option(parser)
     add("--initial-position", type=float, default=0.0, metavar="M", help="of the piston, 0 is mid-stroke")
     add("--position-noise", type=float, default=0.0, metavar="M", help="standard deviation")
     add("--pressure-noise", type=float, default=0.0, metavar="PA", help="standard deviation, of each transducer")
