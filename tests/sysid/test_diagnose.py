@@ -9,6 +9,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
+from hydraulic_sysid.diagnosis.search.data_sheet import as_filed, relaxed
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
@@ -228,6 +229,17 @@ def test_free_parameters_without_bounds_get_the_data_sheets_scatter(model) -> No
     bench = bounded(load_model("moog_mcr_m_1002_bench"))
     assert bench.entry("moving_mass").bounds == (250.0, 1000.0)
     assert bounded(model).entry("moving_mass").bounds == (400.0, 600.0)  # the file's own
+
+
+def test_what_a_search_let_move_is_bound_again_as_the_file_has_it() -> None:
+    filed = load_model("moog_mcr_m_1002_bench").with_entry("supply_pressure", bounds=(13.5e6, 14.5e6))
+    found = relaxed(bounded(filed)).with_values({"moving_mass": 600.0, "supply_pressure": 15e6}, source="fitted")
+    done = as_filed(found, filed)
+    assert done.entries["moving_mass"].bounds is None and done.value("moving_mass") == 600.0
+    assert done.entries["supply_pressure"].bounds is None, "the value lies beyond them"
+    kept = as_filed(found.with_values({"supply_pressure": 14.2e6}), filed).entries["supply_pressure"]
+    assert (kept.bounds, kept.free) == ((13.5e6, 14.5e6), filed.entries["supply_pressure"].free)
+    assert done.entries["piston_area_a"].free is None
 
 
 def test_the_step_of_codes_survives_what_a_text_file_rounds_away() -> None:

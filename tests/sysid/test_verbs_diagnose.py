@@ -133,6 +133,46 @@ def test_contradictions_are_warnings_on_top_of_the_answer(
     assert capsys.readouterr().out.startswith("warning: The travel is too long. Mend the stroke.\n")
 
 
+@pytest.mark.parametrize(
+    ("kind", "competing", "written"),
+    [
+        ("missing", (), ["model.yaml"]),
+        ("data sheet", (), ["model.yaml"]),
+        ("complete", (), ["model.yaml"]),
+        (
+            "indistinguishable",
+            ("valve_deadband", "backlash"),
+            ["competing_backlash.yaml", "competing_valve_deadband.yaml"],
+        ),
+        ("outside the library", (), []),
+    ],
+)
+def test_apply_writes_what_the_verdict_says(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    kind: str, competing: tuple[str, ...], written: list[str],
+) -> None:  # fmt: skip
+    document = json.loads((run / "diagnose.json").read_text())
+    document["verdict"]["kind"] = kind
+    model = load_model(run / "model.yaml")
+    monkeypatch.setattr(
+        "hydraulic_sysid.verbs.diagnose.diagnose",
+        lambda *_: Diagnosis(model, dict.fromkeys(competing, model), document),
+    )
+    command = ["--model", "sample_bench", "--record", str(RECORDS), "--out", str(tmp_path), "--apply"]
+    assert diagnose_main(command) == (0 if "model.yaml" in written else 1)
+    assert sorted(f.name for f in tmp_path.glob("*.yaml")) == written
+    assert ("no model.yaml was written" in capsys.readouterr().err) == ("model.yaml" not in written)
+
+
+def test_nothing_but_what_was_found_has_changed_in_the_model(run: Path) -> None:
+    before, after = load_model("sample_bench"), load_model(run / "model.yaml")
+    assert set(after.effects) - set(before.effects) == {"valve_deadband"}
+    fitted = before.movable_keys()
+    for key, entry in before.entries.items():
+        assert (after.entries[key].free, after.entries[key].bounds) == (entry.free, entry.bounds), key
+        assert key in fitted or after.value(key) == entry.value, key
+
+
 def test_a_model_is_never_overwritten(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert diagnose_main(["--model", "sample_bench", "--record", str(RECORDS), "--apply", "--out", str(run)]) == 2
     assert "never overwritten" in capsys.readouterr().err

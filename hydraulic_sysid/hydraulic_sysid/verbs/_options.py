@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,12 +35,13 @@ Say = Callable[[str], None]
 class Done:
     """What a verb has come to: its document, what writes further files into the run's folder, and whether it is well.
 
-    The exit code is 0, or 1 where ``good`` is false.
+    The exit code is 0, or 1 where ``good`` is false. ``notes`` say why something that was asked for was not written.
     """
 
     result: dict[str, Any]
     files: Mapping[str, Callable[[Path], object]] = field(default_factory=dict)
     good: bool = True
+    notes: Sequence[str] = ()
 
 
 def parser(verb: str, doc: str, epilog: str | None = None) -> argparse.ArgumentParser:
@@ -85,6 +87,8 @@ def run(
         else:
             show(done.result, tables.console())
             print("", *(folder / name for name in done.files), page, sep="\n")
+        for note in done.notes:
+            print(note, file=sys.stderr)
         return cli.OK if done.good else cli.NEGATIVE
 
     return cli.run(parser, action, argv)

@@ -3,7 +3,8 @@
 Fits what the model calls free, tries every effect of the library that is off, and says what is missing, what these
 data cannot tell apart, that nothing is missing, or what shape it has that no effect explains. What counts must lower
 the error on data that no fit has seen. Writes diagnose.json and a page (report.html); with --apply also model.yaml,
-the model with what was found; for a verdict with several names each competing model (competing_EFFECT.yaml).
+the model that the verdict names, and nothing where it names none; for a verdict with several names each competing model
+(competing_EFFECT.yaml).
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
     parser = opt.parser("diagnose", __doc__, EPILOG)
     opt.add_diagnosis_options(parser)
-    parser.add_argument("--apply", action="store_true", help=f"write the model with what was found ({opt.MODEL})")
+    parser.add_argument("--apply", action="store_true", help=f"write the model that the verdict names ({opt.MODEL})")
     return opt.run(parser, _diagnose, _diagnosis_table.show, argv, bulky=("worst_segments",))
 
 
@@ -41,10 +42,14 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     records = opt.read_records(options)
     validation = opt.read_kept_back(options.holdout, options)
     done = diagnose(model, records, validation, FitSettings(length=options.segment), say)
-    verdict = done.result["verdict"]
-    models = {opt.MODEL: done.model} if options.apply else {}
-    models |= {f"competing_{name}.yaml": other for name, other in done.alternatives.items()}
-    if done.alternatives:
-        models |= {f"competing_{name}.yaml": done.model for name in verdict["effects"] if name not in done.alternatives}
-    files = {name: partial(save_model, one) for name, one in models.items()}
-    return opt.Done(done.result, files, verdict["kind"] in ("missing", "complete", "data sheet", "recording"))
+    kind = done.result["verdict"]["kind"]
+    models = {f"competing_{name}.yaml": model for name, model in done.competing.items()}
+    notes = []
+    if options.apply and done.decided:
+        models = {opt.MODEL: done.model} | models
+    elif options.apply:
+        instead = f" ({', '.join(models)} are what is possible)" if models else ""
+        notes.append(
+            f"no {opt.MODEL} was written: the verdict is {kind!r}, which says of no model that it is right{instead}"
+        )
+    return opt.Done(done.result, {name: partial(save_model, one) for name, one in models.items()}, done.decided, notes)

@@ -10,6 +10,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitSettings
 
+from .data_sheet import as_filed
 from .diagnosis import finished
 from .document import added_document
 from .errors import DiagnosisError
@@ -46,4 +47,4 @@ def add(
     found = Search.of(model, records, validation, settings or FitSettings(), progress or (lambda _: None)).add(effect)
     confirmed = material(found.base.misfit, found.final.misfit)
     known = parameter_errors(found.final.linearisation)
-    return Addition(finished(found, known), confirmed, added_document(found, known, confirmed))
+    return Addition(as_filed(finished(found, known), model), confirmed, added_document(found, known, confirmed))

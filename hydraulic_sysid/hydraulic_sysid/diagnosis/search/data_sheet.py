@@ -90,6 +90,19 @@ def restored(model: Model, given: Model, moved: Sequence[str]) -> Model:
     return model
 
 
+def as_filed(model: Model, filed: Model) -> Model:
+    """A fitted model whose parameters may move as far as they may in its file: a search lets them move further.
+
+    Bounds that a fitted value lies beyond are left out.
+    """
+    for key, own in model.entries.items():
+        if key in filed.entries:
+            free, bounds = filed.entries[key].free, filed.entries[key].bounds
+            beyond = bounds is not None and not bounds[0] <= own.value <= bounds[1]
+            model = model.with_entry(key, free=free, bounds=None if beyond else bounds)
+    return model
+
+
 def suspects(at: Linearisation, given: Model, named: Sequence[str]) -> list[Deviation]:
     """Numbers of ``given`` whose release beside those ``named`` promises most, the best first.
 

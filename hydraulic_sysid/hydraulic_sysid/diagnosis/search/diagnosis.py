@@ -17,7 +17,7 @@ from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locat
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
-from .data_sheet import Deviation
+from .data_sheet import Deviation, as_filed
 from .document import document, with_balances
 from .misfit import explained
 from .nonparametric_curves import nonparametric_curves
@@ -27,15 +27,20 @@ from .uncertainty import Known, parameter_errors
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What came out. ``model``: with the missing effects on, fitted, its errors known and its history continued.
+    """What came out. ``model``: where the search ended, fitted, its errors known and its history continued.
 
-    ``alternatives``: models with another effect in the place of one added, where the data do not decide; ``result``:
-    the document (docs/report-json.md).
+    ``competing``: models between which the data do not decide, by the effects that only they have, none where they do;
+    ``result``: the document (docs/report-json.md).
     """
 
     model: Model
-    alternatives: dict[str, Model]
+    competing: dict[str, Model]
     result: dict[str, Any]
+
+    @property
+    def decided(self) -> bool:
+        """Whether the verdict says of one model that it explains the records: then that is ``model``."""
+        return self.result["verdict"]["kind"] in verdicts.DECIDED
 
 
 def diagnose(
@@ -68,14 +73,17 @@ def diagnose(
     known = parameter_errors(found.final.linearisation)
     found = replace(found, moved=[with_error(d, known) for d in found.moved])
     whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
-    done, alternatives = finished(found, known), verdicts.alternatives(found, verdict)
+    done = as_filed(finished(found, known), model)
+    competing = {name: as_filed(other, model) for name, other in verdicts.alternatives(found, verdict).items()}
+    if verdict.kind == verdicts.INDISTINGUISHABLE:
+        competing["+".join(name for name in verdict.added if verdict.indistinguishable_from(name))] = done
     before, after = found.base.model, found.final.model if found.added or found.moved else None
     suspected = None if not outside else before if proxy else after
     del found, suspect  # their sensitivities would take up the memory that the balances need
     say("balances")
     rows, where = _balances(before, records, before is suspected)
     rows_after, where_after = _balances(after, records, after is suspected) if after else ([], [])
-    return Diagnosis(done, alternatives, with_balances(whole, rows, rows_after, where or where_after))
+    return Diagnosis(done, competing, with_balances(whole, rows, rows_after, where or where_after))
 
 
 def with_error(deviation: Deviation, known: Mapping[str, Known]) -> Deviation:

@@ -27,6 +27,8 @@ COMPLETE = "complete"
 DATA_SHEET = "data sheet"
 RECORDING = "recording"
 OUTSIDE = "outside the library"
+DECIDED = (MISSING, COMPLETE, DATA_SHEET, RECORDING)
+"""Verdicts that say which model explains the records."""
 
 MANY_SPIKES = 1e-4  # of all samples: more are a fault of the recording
 NO_EFFECT = "No effect of the library is missing."
