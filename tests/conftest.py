@@ -219,7 +219,7 @@ class Client:
         """Let the spinning thread see what was created."""
         self._executor.wake()
 
-    def collect(self, name: str, depth: int = 5000) -> list[Any]:
+    def collect(self, name: str, depth: int = 5000, namespace: str = "/actuator") -> list[Any]:
         """A list that grows by every message on a topic of the contract."""
         from hydraulic_interfaces.contract import find_topic, topic
         from hydraulic_interfaces.conversions import interface_class
@@ -227,17 +227,18 @@ class Client:
 
         heard: list[Any] = []
         kind = interface_class(find_topic(name).type)
-        self.node.create_subscription(kind, topic(name), heard.append, profile(name, depth))
+        self.node.create_subscription(kind, topic(name, namespace), heard.append, profile(name, depth))
         self.wake()
         return heard
 
-    def publisher(self, name: str) -> Any:
+    def publisher(self, name: str, namespace: str = "/actuator") -> Any:
         """A publisher on a topic of the contract."""
         from hydraulic_interfaces.contract import find_topic, topic
         from hydraulic_interfaces.conversions import interface_class
         from hydraulic_interfaces.qos import profile
 
-        return self.node.create_publisher(interface_class(find_topic(name).type), topic(name), profile(name))
+        kind = interface_class(find_topic(name).type)
+        return self.node.create_publisher(kind, topic(name, namespace), profile(name))
 
     def call(self, kind: str, name: str, patience: float = PATIENCE_S, **fields: Any) -> Any:
         """Response of a service of type `kind` ("std_srvs/srv/Trigger") at the full name `name`.

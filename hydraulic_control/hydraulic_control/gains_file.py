@@ -1,7 +1,7 @@
 """Parameter files of the controller: what `tune` writes and the node reads, in the form of ROS parameter files.
 
 # where the gains come from, as comments
-/actuator/controller:
+/**/controller:
   ros__parameters:
     controller: npid
     kp: 150.0
@@ -20,11 +20,12 @@ from ruamel.yaml.error import YAMLError
 
 from hydraulic_control.errors import ControlError
 from hydraulic_control.parameters import SPECS, check
-from hydraulic_interfaces.contract import CONTROLLER_NODE, absolute
+from hydraulic_interfaces.contract import CONTROLLER_NODE
 from hydraulic_interfaces.errors import HydraulicError
 
 FOLDER = Path(__file__).parent / "gains"
-NODE = absolute(CONTROLLER_NODE)
+NODE = f"/**/{CONTROLLER_NODE}"
+"""The controller in whatever namespace; a file may also name one, such as "/left/controller"."""
 
 
 def shipped() -> tuple[str, ...]:
@@ -53,9 +54,11 @@ def load(name_or_path: str | Path) -> dict[str, Any]:
         document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, YAMLError) as error:
         raise ControlError(f"{path}: cannot be read: {error}") from None
-    rows = document.get(NODE, {}).get("ros__parameters") if isinstance(document, dict) else None
+    sections = document.items() if isinstance(document, dict) else ()
+    found = [section for name, section in sections if str(name).endswith(f"/{CONTROLLER_NODE}")]
+    rows = found[0].get("ros__parameters") if len(found) == 1 and isinstance(found[0], dict) else None
     if not isinstance(rows, dict):
-        raise ControlError(f"{path}: has no {NODE} with ros__parameters")
+        raise ControlError(f"{path}: expected one {NODE}, or {CONTROLLER_NODE} of a namespace, with ros__parameters")
     try:
         return {name: check(name, value) for name, value in _flat(rows).items() if name != "use_sim_time"}
     except HydraulicError as error:

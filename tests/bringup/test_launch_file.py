@@ -125,8 +125,8 @@ def test_parameter_files_fit_their_nodes(plant: str) -> None:
     own = {"sim": simulator.PARAMETERS, "can": can_driver.PARAMETERS}[plant]
     specs = {s.name: s for s in (*plant_node.PARAMETERS, *own)}
     file = yaml.safe_load((BRINGUP / "config" / constant("CONFIGURATIONS")[plant]).read_text(encoding="utf-8"))
-    assert list(file) == [contract.absolute(contract.PLANT_NODE)]
-    values = file[contract.absolute(contract.PLANT_NODE)]["ros__parameters"]
+    assert list(file) == [f"/**/{contract.PLANT_NODE}"], "of a plant in any namespace"
+    values = file[f"/**/{contract.PLANT_NODE}"]["ros__parameters"]
     assert set(values) <= set(specs)
     assert values["watchdog"] == contract.WATCHDOG_S
     for name, value in values.items():

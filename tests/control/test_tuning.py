@@ -177,6 +177,7 @@ def test_gains_files(tmp_path: Path) -> None:
         ("a: b", "ros__parameters"),
         ("{", "cannot be read"),
         ("/actuator/controller:\n  ros__parameters:\n    kp: -1.0\n", "kp is -1"),
+        ("/a/controller: {ros__parameters: {kp: 1.0}}\n/b/controller: {ros__parameters: {kp: 2.0}}", "expected one"),
         ("/actuator/controller:\n  ros__parameters:\n    speed: 1.0\n", "no parameter"),
     ):
         file.write_text(text)
@@ -184,6 +185,8 @@ def test_gains_files(tmp_path: Path) -> None:
             gains_file.load(file)
     with pytest.raises(ControlError, match="shipped are"):
         gains_file.load("turbo")
+    file.write_text("/left/controller: {ros__parameters: {kp: 150.0}}")
+    assert gains_file.load(file) == {"kp": 150.0}
 
 
 @pytest.fixture

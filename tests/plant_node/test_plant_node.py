@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 SCRIPT = Path(__file__).parent / "integrator_plant.py"
 PLANT = "/actuator/plant"
+HARDWARE = f"can{os.getpid()}"  # of this process alone: other tests run at the same time
 
 
 @pytest.fixture
@@ -258,9 +260,11 @@ def test_one_plant_per_name(start: Any, client: Any, wait_until: Any, journal: P
 
 
 def test_a_real_actuator_has_a_short_watchdog(start: Any, client: Any) -> None:
-    process = start("-p", "hardware:=can0", autostart=False)
+    process = start("-p", f"hardware:={HARDWARE}", autostart=False)
     assert not client.change_state("configure")
-    process.says("watchdog is 2 s: an actuator on can0 must not be driven for longer without a command than 0.2 s")
+    process.says(
+        f"watchdog is 2 s: an actuator on {HARDWARE} must not be driven for longer without a command than 0.2 s"
+    )
     assert set_parameter(client, "watchdog", 0.2).successful
     assert client.change_state("configure")
 
@@ -268,10 +272,10 @@ def test_a_real_actuator_has_a_short_watchdog(start: Any, client: Any) -> None:
 def test_a_real_actuator_remembers_a_stop_and_an_end_that_nobody_ordered(
     start: Any, client: Any, wait_until: Any
 ) -> None:
-    real = ("-p", "hardware:=can0", "-p", "watchdog:=0.2")
+    real = ("-p", f"hardware:={HARDWARE}", "-p", "watchdog:=0.2")
     process = start(*real, "-p", "enable_on_activate:=true", autostart=False)
     assert not client.change_state("configure")
-    process.says("enable_on_activate: an actuator on can0 is enabled by the service alone")
+    process.says(f"enable_on_activate: an actuator on {HARDWARE} is enabled by the service alone")
     process.end()
 
     def again(last: Any, number: int) -> Any:

@@ -21,7 +21,7 @@ from hydraulic_sysid.verbs import recover as verb
 
 START = 1_700_000_000 * 10**9
 TEXT = BagTopic("/test/text", message_type("std_msgs/msg/String"), (offered_qos(10, False),))
-EXPERIMENT = BagTopic(topic("experiment"), message_type("std_msgs/msg/String"), (offered_qos(1, True),))
+EXPERIMENT = BagTopic(topic("experiment", "/left"), message_type("std_msgs/msg/String"), (offered_qos(1, True),))
 FILE = "killed_0.mcap"
 
 

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from hydraulic_interfaces.samples import PlantSample
-from hydraulic_node_utils.plant_report import COMMAND_ROW, PLANT_ROW
 from hydraulic_sysid.excitation import Phase, Plan, Session
 from hydraulic_sysid.excitation.signals.steps import Steps
 
+PLANT_ROW, COMMAND_ROW = "/actuator/plant: plant", "/actuator/plant: command"
 START_NS = 1_700_000_000_000_000_000
 PLAN = Plan("any", Steps([2.0], 1.0), 0.3, fade_in=0.0, fade_out=0.0, rest_before=0.1, rest_after=0.1)
 
@@ -35,7 +35,7 @@ class Bench:
         ok = not message.startswith("stopped")
         self.session.diagnose(PLANT_ROW, ok, message, {"enabled": enabled})
         self.session.diagnose(COMMAND_ROW, True, "", {"source": source})
-        self.session.diagnose("/other: plant", False, "of no interest", {"enabled": "False"})
+        self.session.diagnose("/left/plant: plant", False, "of no interest", {"enabled": "False"})
 
     @property
     def now(self) -> float:

@@ -58,16 +58,22 @@ def event(kind: str, stamp: int, **more: Any) -> Message:
     return ("experiment", stamp, STORE.types[STRING](text))
 
 
-def bag(folder: Path, messages: Sequence[Message], plugin: StoragePlugin = StoragePlugin.MCAP) -> Path:
+def bag(
+    folder: Path,
+    messages: Sequence[Message],
+    plugin: StoragePlugin = StoragePlugin.MCAP,
+    namespaces: Sequence[str] = ("/actuator",),
+) -> Path:
     """Written by a library of its own, so that what reads it is not tested by what wrote it."""
     types = {"experiment": STRING, "description": STRING, "pressure": PRESSURE}
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
         known = {}
         for name, stamp, message in sorted(messages, key=lambda m: m[1]):
             kind = types.get(name.partition("_")[0], JOINTS)
-            if name not in known:
-                known[name] = writer.add_connection(f"/actuator/{name}", kind, typestore=STORE)
-            writer.write(known[name], stamp + 100_000, STORE.serialize_cdr(message, kind))
+            for full in (f"{namespace}/{name}" for namespace in namespaces):
+                if full not in known:
+                    known[full] = writer.add_connection(full, kind, typestore=STORE)
+                writer.write(known[full], stamp + 100_000, STORE.serialize_cdr(message, kind))
     return folder
 
 
@@ -90,6 +96,22 @@ def test_samples_of_one_stamp_are_joined(tmp_path: Path, plugin: StoragePlugin) 
     np.testing.assert_array_equal(record["pressure_a"], 1e6 + index)
     np.testing.assert_array_equal(record["pressure_b"], 2e6 - index)
     assert record.description["start_ns"] == START
+
+
+@pytest.mark.parametrize("namespace", ["/left", "/hall_2/left", ""])
+def test_an_actuator_in_a_namespace_of_its_own_is_read(tmp_path: Path, namespace: str) -> None:
+    messages = [*streams(), event("started", START + 10 * MS), event("finished", START + 60 * MS)]
+    (record,) = read_records(bag(tmp_path / "run", messages, namespaces=[namespace]))
+    assert len(record) == 50 and "pressure_b" in record
+    with pytest.raises(TimeError, match=f"column {namespace}/state: stamp"):
+        read_records(bag(tmp_path / "twice", [*streams(), state(99)], namespaces=[namespace]))
+
+
+def test_of_two_actuators_one_has_to_be_named_by_the_contract(tmp_path: Path) -> None:
+    (record,) = read_records(bag(tmp_path / "run", list(streams()), namespaces=["/actuator", "/left"]))
+    assert any("/left is not" in note for note in record.notes)
+    with pytest.raises(BagError, match="several actuators: /left, /right; expected a bag of each"):
+        read_records(bag(tmp_path / "both", list(streams()), namespaces=["/left", "/right"]))
 
 
 def test_what_was_not_measured_is_absent(tmp_path: Path) -> None:

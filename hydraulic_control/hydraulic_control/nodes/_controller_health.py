@@ -8,7 +8,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from hydraulic_control.lockstep import ReferenceLockstep
 from hydraulic_control.session import ControlSession
-from hydraulic_interfaces.contract import CONTROLLER_NODE, absolute
 from hydraulic_node_utils.nodes import diagnostics
 from hydraulic_node_utils.nodes.diagnostics import ERROR, OK, WARN
 
@@ -16,8 +15,8 @@ from hydraulic_node_utils.nodes.diagnostics import ERROR, OK, WARN
 class ControllerHealth:
     """Builds the diagnostics; a fault raises the level in the message after it."""
 
-    def __init__(self, session: ControlSession) -> None:
-        self._session = session
+    def __init__(self, node: str, session: ControlSession) -> None:
+        self._name, self._session = f"{node}: loop", session
         self._seen = 0
         self._answered = 0
         self._then_ns = 0
@@ -56,5 +55,5 @@ class ControllerHealth:
             level, text = WARN, session.trouble
         elif state == "active" and rate == 0.0:
             level, text = ERROR, "no state can be answered: drive is 0 V"
-        row = diagnostics.row(f"{absolute(CONTROLLER_NODE)}: loop", level, text, values, "controller")
+        row = diagnostics.row(self._name, level, text, values, "controller")
         return diagnostics.array(now_ns, row)

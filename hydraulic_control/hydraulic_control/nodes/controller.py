@@ -28,7 +28,7 @@ from hydraulic_node_utils.nodes.callbacks import understood
 from hydraulic_node_utils.nodes.diagnostics import OK
 from hydraulic_node_utils.nodes.guarded_lifecycle import guard_transitions
 from hydraulic_node_utils.nodes.serving import Served, serve
-from hydraulic_node_utils.plant_report import COMMAND_ROW, PLANT_ROW, PlantReport
+from hydraulic_node_utils.plant_report import PlantReport
 from hydraulic_plant_node.pacing import release_realtime_for_all, request_realtime_for_all
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -45,7 +45,7 @@ class ControllerNode(Served, LifecycleNode):
         self._state = "unconfigured"
         self._session = ControlSession(Controller())
         self._settings = ControllerParameters(self, self._session, lambda: self._state != "unconfigured")
-        self._health = ControllerHealth(self._session)
+        self._health = ControllerHealth(self.get_fully_qualified_name(), self._session)
         self._encode = CommandEncoder(CONTROLLER_NODE)
         self._command = self.create_publisher(JointState, "command", profile("command"))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
@@ -54,7 +54,7 @@ class ControllerNode(Served, LifecycleNode):
         self._stamp_ns = 0
         self._lockstep = self._health.lockstep = ReferenceLockstep() if self._settings.table["lockstep"] else None
         self._waiting: PlantSample | None = None
-        self._plant = PlantReport()
+        self._plant = PlantReport(self.get_namespace())
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, profile("diagnostics"))
         self.create_subscription(JointState, "state", self._on_state, profile("state", STATE_DEPTH))
         self.create_subscription(JointState, "reference", self._on_reference, profile("reference", STATE_DEPTH))
@@ -155,8 +155,9 @@ class ControllerNode(Served, LifecycleNode):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for row in message.status:
-            self._plant.update(row.name, row.level == OK, row.message, {pair.key: pair.value for pair in row.values})
-            if row.name in (PLANT_ROW, COMMAND_ROW) and (reason := self._plant.disobedience(CONTROLLER_NODE)):
+            values = {pair.key: pair.value for pair in row.values}
+            own = self._plant.update(row.name, row.level == OK, row.message, values)
+            if own and (reason := self._plant.disobedience(CONTROLLER_NODE)):
                 self._session.disobeyed(reason, from_time(message.header.stamp))
 
     def _steady(self) -> float:

@@ -18,7 +18,7 @@ from hydraulic_control.errors import ControlError
 from hydraulic_control.nodes._reference_parameters import PARAMETERS
 from hydraulic_control.reference_run import ReferenceRun, StandstillWatch
 from hydraulic_control.trajectories import MotionLimits
-from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE, absolute
+from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE
 from hydraulic_interfaces.conversions import ReferenceEncoder, sample_from_messages
 from hydraulic_interfaces.qos import profile
 from hydraulic_node_utils.json_file import NewJson
@@ -114,7 +114,7 @@ class ReferenceNode(ServedNode):
         state = f"plays {self._run.kind}" if self._run else "waits for states" if self._armed else self._end
         level = diagnostics.WARN if self._failed else diagnostics.OK
         values = {"last_run": self._end}
-        row = diagnostics.row(f"{absolute(REFERENCE_NODE)}: run", level, state, values, "reference")
+        row = diagnostics.row(f"{self.get_fully_qualified_name()}: run", level, state, values, "reference")
         self._diagnostics.publish(diagnostics.array(self.get_clock().now().nanoseconds, row))
 
     def _start(self) -> str:

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Callable
 
-from hydraulic_interfaces.contract import ABORTED, EXCITATION_NODE, FINISHED, STARTED
+from hydraulic_interfaces.contract import ABORTED, EXCITATION_NODE, FINISHED, NAMESPACE, STARTED
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.plant_report import PlantReport
 from hydraulic_sysid.excitation.applied import AppliedDriveCheck
@@ -20,15 +20,16 @@ NOT_STARTED = "not started"
 class Session:
     """Arms plans, starts each when the plant is ready for it, plays it, and reports how it ended.
 
-    `emit` takes the events (JSON); `listeners` says how many subscribers the commands have. Times `now` are
+    `emit` takes the events (JSON); `listeners` says how many subscribers the commands have; the plant is that of
+    `namespace`. Times `now` are
     seconds of a steady clock: silence is measured there, so that a process which was held up for a moment,
     with its states still waiting, does not take itself for deserted.
     """
 
-    def __init__(self, emit: Callable[[str], None], listeners: Callable[[], int]) -> None:
+    def __init__(self, emit: Callable[[str], None], listeners: Callable[[], int], namespace: str = NAMESPACE) -> None:
         self._emit, self._listeners = emit, listeners
         self.state_timeout, self.applied_tolerance, self.listeners_needed = 0.5, 0.1, 1
-        self.plant = PlantReport()
+        self.plant = PlantReport(namespace)
         self.armed: ExcitationRun | None = None
         self.run: ExcitationRun | None = None
         self.ended: Phase | None = None  # how the last run ended

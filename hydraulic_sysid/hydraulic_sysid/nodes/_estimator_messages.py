@@ -6,7 +6,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from hydraulic_interfaces.contract import ESTIMATOR_NODE, absolute
+from hydraulic_interfaces.contract import ESTIMATOR_NODE
 from hydraulic_interfaces.conversions import to_time
 from hydraulic_node_utils.nodes import diagnostics
 from hydraulic_sysid.linear.models.recursive_arx import RecursiveArx, Step
@@ -39,10 +39,10 @@ def fit(step: Step, running: RunningFit, stamp_ns: int) -> JointState:
     return message
 
 
-def health(text: str, trouble: bool, values: dict[str, object], now_ns: int) -> DiagnosticArray:
-    """The estimator's row on `/diagnostics`."""
+def health(node: str, text: str, trouble: bool, values: dict[str, object], now_ns: int) -> DiagnosticArray:
+    """The row of `node`, an estimator, on `/diagnostics`."""
     level = diagnostics.WARN if trouble else diagnostics.OK
-    row = diagnostics.row(f"{absolute(ESTIMATOR_NODE)}: estimate", level, text, values, "estimator")
+    row = diagnostics.row(f"{node}: estimate", level, text, values, "estimator")
     return diagnostics.array(now_ns, row)
 
 

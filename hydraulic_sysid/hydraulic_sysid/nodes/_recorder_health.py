@@ -5,7 +5,6 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-from hydraulic_interfaces.contract import topic
 from hydraulic_interfaces.qos import profile
 from hydraulic_node_utils.nodes import diagnostics
 from hydraulic_node_utils.nodes.diagnostics import ERROR, OK, WARN
@@ -20,7 +19,7 @@ class RecorderHealth:
 
     def __init__(self, node: Node, recording: Recording) -> None:
         self._name, self._recording = node.get_fully_qualified_name(), recording
-        self._publisher = node.create_publisher(DiagnosticArray, topic("diagnostics"), profile("diagnostics"))
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
         self._then = 0
         self._before: dict[str, int] = {}
         self._missing = 0

@@ -7,7 +7,7 @@ import time
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 
-from hydraulic_interfaces.contract import TOPICS, Topic, absolute, topic
+from hydraulic_interfaces.contract import TOPICS, Topic
 from hydraulic_interfaces.conversions import interface_class
 from hydraulic_interfaces.qos import profile
 from hydraulic_node_utils.nodes.mailbox import Mailbox
@@ -28,10 +28,10 @@ class _Channel:
     """One topic: its subscription, its row in the bag, its gaps."""
 
     def __init__(self, node: Node, row: Topic) -> None:
-        name, offered = absolute(row.name), profile(row.qos)
+        name, offered = node.resolve_topic_name(row.name), profile(row.qos)
         latched = offered.durability == DurabilityPolicy.TRANSIENT_LOCAL
         self.topic = BagTopic(name, message_type(row.type), (offered_qos(offered.depth, latched),))
-        self.box = Mailbox(node, interface_class(row.type), name, profile(row.qos, _DEPTH), raw=True)
+        self.box = Mailbox(node, interface_class(row.type), row.name, profile(row.qos, _DEPTH), raw=True)
         self.continuity = Continuity()
         self.sampled = row.publisher == "plant" and row.qos == "stream"
         self.latest = b""
@@ -49,7 +49,7 @@ class Intake:
         self._channels = [_Channel(node, row) for row in TOPICS if row.name != _LAST]
         self._plant_due = time.monotonic() + _PLANT_S
         self._whole = False
-        self._experiment_topic = topic("experiment")
+        self._experiment_topic = node.resolve_topic_name("experiment")
         self.experiment = ExperimentLog()
 
     def drain(self) -> None:

@@ -117,7 +117,8 @@ class Estimator(ServedNode):
         figures |= {"one_step_fit_percent": f"{self._arx.fit.best_fit:.2f}", "certainty": f"{arx.certainty:.3g}"}
         if self._live is not None:
             figures |= {"model": self._live.plant.model.name, "restarts": self._live.restarts}
-        self._health.publish(messages.health(text, silent, figures, self.get_clock().now().nanoseconds))
+        now_ns = self.get_clock().now().nanoseconds
+        self._health.publish(messages.health(self.get_fully_qualified_name(), text, silent, figures, now_ns))
 
     def _reset(self) -> str:
         self._arx.estimate.reset_covariance()

@@ -42,7 +42,7 @@ class ExcitationNode(ServedNode):
         self._command = self.create_publisher(JointState, "command", profile("command"))
         self._experiment = self.create_publisher(String, "experiment", profile("experiment"))
         self._health = self.create_publisher(DiagnosticArray, "/diagnostics", profile("diagnostics"))
-        self._session = Session(self._tell, self._command.get_subscription_count)
+        self._session = Session(self._tell, self._command.get_subscription_count, self.get_namespace())
         self._patience_ends, self._reported = math.inf, -math.inf
         self._leaving = False
         if self._table["autostart"]:
@@ -65,7 +65,8 @@ class ExcitationNode(ServedNode):
         if now - self._reported > HEALTH_PERIOD_S:
             self._reported = now
             waiting_for = self._session.obstacle(now) if self._session.armed else ""
-            self._health.publish(health(self._session, waiting_for, self.get_clock().now().nanoseconds))
+            now_ns = self.get_clock().now().nanoseconds
+            self._health.publish(health(self.get_fully_qualified_name(), self._session, waiting_for, now_ns))
             if self._session.armed and now > self._patience_ends:
                 self.get_logger().error(f"{NOT_STARTED}: waited too long for {waiting_for}")
                 self._session.stop("")

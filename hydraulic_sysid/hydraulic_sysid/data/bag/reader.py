@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from hydraulic_interfaces.contract import NAMESPACE, find_topic, topic
 from hydraulic_sysid.data.bag.metadata import FILE_NAME
 from hydraulic_sysid.data.errors import BagError
 
@@ -20,35 +21,54 @@ class Stream:
 
 @dataclass(frozen=True)
 class Bag:
-    """Messages by full topic name, all topics there are with their types, and the texts kept with the bag."""
+    """Messages of one actuator by full topic name, all topics there are with their types, the texts kept with the bag.
+
+    `namespace` is that of the actuator, `others` those of further ones in the bag.
+    """
 
     path: Path
     streams: dict[str, Stream]
     types: dict[str, str]
     custom: dict[str, str]
+    namespace: str = NAMESPACE
+    others: tuple[str, ...] = ()
+
+    def topic(self, name: str) -> str:
+        """Full name of a topic of the contract in the actuator's namespace."""
+        return topic(name, self.namespace)
+
+    def stream(self, name: str) -> Stream | None:
+        """Messages of a topic of the contract; None where the bag has none."""
+        stream = self.streams.get(self.topic(name))
+        return stream if stream is not None and stream.payloads else None
 
 
-def read(path: Path, topics: Iterable[str]) -> Bag:
-    """The messages of those of ``topics`` (full names) that the bag holds.
+def read(path: Path, names: Iterable[str]) -> Bag:
+    """The messages of those topics of the contract (``names``) that the bag holds.
 
-    :raises BagError: not closed, cut off or damaged (what can be done is said), or inconsistent.
+    They are those of the actuator in the namespace of the contract, or of the only one.
+
+    :raises BagError: not closed, cut off or damaged (what can be done is said), inconsistent, or of several actuators.
     """
     from rosbags.rosbag2 import Reader
 
     if path.is_dir() and not (path / FILE_NAME).is_file():
         hint = f"make it whole with: python -m hydraulic_sysid recover {path}"
         raise BagError(path, f"the bag was not closed (no {FILE_NAME}); {hint}")
-    wanted = set(topics)
     try:
         with Reader(path) as reader:
-            chosen = [connection for connection in reader.connections if connection.topic in wanted]
             types = {connection.topic: connection.msgtype for connection in reader.connections}
+            namespace, *others = _actuators(path, types)
+            wanted = {topic(name, namespace) for name in names}
+            chosen = [connection for connection in reader.connections if connection.topic in wanted]
             streams = {connection.topic: Stream(connection.msgtype) for connection in chosen}
             expected = sum(connection.msgcount for connection in chosen)
             if chosen:
                 for connection, _, payload in reader.messages(chosen):
                     streams[connection.topic].payloads.append(payload)
             custom = getattr(reader.storage.metadata, "custom", None) or {}
+    except BagError:
+        raise
     except Exception as error:  # of a damaged file the library lets through struct, zstd and other errors
         text = " ".join(str(error).split())
         hint = f"python -m hydraulic_sysid recover {path}"
@@ -56,4 +76,20 @@ def read(path: Path, topics: Iterable[str]) -> Bag:
     found = sum(len(stream.payloads) for stream in streams.values())
     if found != expected:
         raise BagError(path, f"{found} messages", expected=f"{expected}, as {FILE_NAME} says")
-    return Bag(path, streams, types, {str(key): str(value) for key, value in custom.items()})
+    texts = {str(key): str(value) for key, value in custom.items()}
+    return Bag(path, streams, types, texts, namespace, tuple(others))
+
+
+def _actuators(path: Path, types: dict[str, str]) -> list[str]:
+    """Namespaces that have a state of the contract's type, the one to be read first."""
+    state = find_topic("state")
+    found = sorted(
+        name.removesuffix(f"/{state.name}")
+        for name, kind in types.items()
+        if name.endswith(f"/{state.name}") and kind == state.type
+    )
+    if NAMESPACE in found or not found:
+        return [NAMESPACE, *(name for name in found if name != NAMESPACE)]
+    if len(found) > 1:
+        raise BagError(path, f"holds the states of several actuators: {', '.join(found)}", expected="a bag of each")
+    return found

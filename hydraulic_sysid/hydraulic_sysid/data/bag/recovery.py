@@ -25,7 +25,7 @@ from mcap.stream_reader import breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
 
-from hydraulic_interfaces.contract import topic
+from hydraulic_interfaces.contract import find_topic
 from hydraulic_sysid.data.bag import metadata
 from hydraulic_sysid.data.bag.continuity import Gaps
 from hydraulic_sysid.data.bag.experiment import ExperimentLog
@@ -160,7 +160,7 @@ def _rewrite(stream: BinaryIO, folder: Path, file_name: str) -> Recovery:
     custom: dict[str, str] = {}
     gaps: dict[str, Gaps] = {}
     experiment = ExperimentLog()
-    experiment_topic = topic("experiment")
+    events = find_topic("experiment")
     writer = BagWriter(folder, file_name=file_name)
     try:
         for record in _records(stream, result):
@@ -169,7 +169,7 @@ def _rewrite(stream: BinaryIO, folder: Path, file_name: str) -> Recovery:
                 if known is None:
                     result.orphans += 1
                     continue
-                if known.name == experiment_topic:
+                if known.name.endswith(f"/{events.name}") and known.type.name == events.type:
                     experiment.take(record.data)
                 gaps.setdefault(known.name, Gaps()).take(record.sequence)
                 writer.write(known, record.log_time, record.publish_time, record.data, record.sequence)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hydraulic_interfaces.contract import PISTON, SERVOVALVE, topic
+from hydraulic_interfaces.contract import PISTON, SERVOVALVE
 from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.bag import cdr, reader
 from hydraulic_sysid.data.bag.reader import Bag
@@ -40,8 +40,8 @@ def read_bag(path: Path, irregular: str = "error") -> list[Record]:
     :raises TimeError: a stamp repeats or goes back, or samples are missing (``irregular`` = "error").
     """
     names = ("state", *PRESSURES, *HELD, "experiment", "description")
-    bag = reader.read(path, [topic(name) for name in names])
-    notes: list[str] = []
+    bag = reader.read(path, names)
+    notes = [f"{bag.namespace} is read, of several actuators; {name} is not" for name in bag.others]
     stamps, channels = _sampled(bag, notes)
     early = {name: _hold(bag, name, stamps, channels) for name in HELD}
     channels = _measured(path, stamps, channels)
@@ -53,53 +53,51 @@ def read_bag(path: Path, irregular: str = "error") -> list[Record]:
     records = []
     for span in spans(bag, stamps):
         lacking = [_note(name, count - span.first) for name, count in early.items() if count > span.first]
-        records += _records(path, irregular, span, stamps, ordered, [*notes, *lacking], bag.custom, plant)
+        records += _records(bag, irregular, span, stamps, ordered, [*notes, *lacking], plant)
     return records
 
 
 def _records(
-    path: Path,
+    bag: Bag,
     irregular: str,
     span: Span,
     stamps: Index,
     channels: Mapping[str, Array],
     notes: list[str],
-    custom: Mapping[str, str],
     plant: dict[str, Any],
 ) -> list[Record]:
     chosen = slice(span.first, span.last)
     start = int(stamps[span.first])
     samples = Samples(
-        path,
+        bag.path,
         (stamps[chosen] - start).astype(np.float64) * 1e-9,
         {name: values[chosen] for name, values in channels.items()},
         lambda index: index + 1,
-        f"stamp of {topic('state')}",
+        f"stamp of {bag.topic('state')}",
     )
     description: dict[str, Any] = {"start_ns": start}
     if span.experiment:
         description["experiment"] = span.experiment
     if plant:
         description["plant"] = plant
-    if custom:
-        description["bag"] = {key: _plain(value) for key, value in custom.items() if key not in _TOLD_ELSEWHERE}
-    name = path.name.removesuffix(SUFFIX)
+    if bag.custom:
+        description["bag"] = {key: _plain(value) for key, value in bag.custom.items() if key not in _TOLD_ELSEWHERE}
+    name = bag.path.name.removesuffix(SUFFIX)
     title = f"{name}.{span.name}" if span.name else name
     return evenly_sampled(samples, irregular, title, [*notes, *span.notes], description)
 
 
 def _plant(bag: Bag) -> dict[str, Any]:
     """What the plant has said of itself, last; empty where it has said nothing."""
-    stream = bag.streams.get(topic("description"))
+    stream = bag.stream("description")
     return next(filter(None, map(json_data, reversed(stream.payloads if stream else ()))), {})
 
 
 def _sampled(bag: Bag, notes: list[str]) -> tuple[Index, dict[str, Array]]:
     """Index that state and all recorded pressures have, and their channels."""
-    state = bag.streams.get(topic("state"))
-    if state is None or not state.payloads:
+    if bag.stream("state") is None:
         there = ", ".join(sorted(bag.types)) or "no topics"
-        raise BagError(bag.path, f"no messages of {topic('state')}; there is {there}")
+        raise BagError(bag.path, f"no messages of {bag.topic('state')}; there is {there}")
     messages = _decoded(bag, "state")
     stamps = _increasing(bag, "state", messages)
     piston, valve = (_joint(bag, "state", messages, name) for name in (PISTON, SERVOVALVE))
@@ -112,15 +110,14 @@ def _sampled(bag: Bag, notes: list[str]) -> tuple[Index, dict[str, Array]]:
     }
     common = stamps
     for name in PRESSURES:
-        stream = bag.streams.get(topic(name))
-        if stream is None or not stream.payloads:
+        if bag.stream(name) is None:
             continue
         pressure = _decoded(bag, name)
         own = _increasing(bag, name, pressure)
         columns[name] = (own, pressure.numbers["fluid_pressure"].astype(np.float64))
         common = np.intersect1d(common, own, assume_unique=True)
     if common.size < 2:
-        recorded = ", ".join(name for name in ("state", *PRESSURES) if topic(name) in bag.streams)
+        recorded = ", ".join(name for name in ("state", *PRESSURES) if bag.topic(name) in bag.streams)
         raise BagError(bag.path, f"{common.size} stamps are in all of {recorded}", expected="two or more")
     for name, (own, _) in columns.items():
         extra = own.size - common.size
@@ -132,8 +129,7 @@ def _sampled(bag: Bag, notes: list[str]) -> tuple[Index, dict[str, Array]]:
 
 def _hold(bag: Bag, name: str, stamps: Index, channels: dict[str, Array]) -> int:
     """Latest value at or before every stamp of a topic with stamps of its own; how many stamps have none."""
-    stream = bag.streams.get(topic(name))
-    if stream is None or not stream.payloads:
+    if bag.stream(name) is None:
         return 0
     messages = _decoded(bag, name)
     joint, path = HELD[name]
@@ -170,11 +166,11 @@ def _measured(path: Path, stamps: Index, channels: Mapping[str, Array]) -> dict[
 
 
 def _decoded(bag: Bag, name: str) -> cdr.Messages:
-    stream = bag.streams[topic(name)]
+    stream = bag.streams[bag.topic(name)]
     try:
         return cdr.decode(stream.type, stream.payloads)
     except cdr.CdrError as error:
-        raise BagError(bag.path, f"{topic(name)}: {error}") from None
+        raise BagError(bag.path, f"{bag.topic(name)}: {error}") from None
 
 
 def _increasing(bag: Bag, name: str, messages: cdr.Messages) -> Index:
@@ -188,7 +184,7 @@ def _increasing(bag: Bag, name: str, messages: cdr.Messages) -> Index:
         bag.path,
         f"stamp {stamps[index + 1]} ns {what}",
         row=index + 2,
-        column=topic(name),
+        column=bag.topic(name),
         expected="increasing stamps from one publisher",
     )
 
@@ -197,14 +193,14 @@ def _joint(bag: Bag, name: str, messages: cdr.Messages, joint: str) -> int:
     """Index of a joint in all messages of a topic."""
     names = set(messages.texts["name"])
     if len(names) != 1 or joint not in next(iter(names)):
-        raise BagError(bag.path, f"{topic(name)}: joints are {sorted(names)}", expected=f"{joint!r} in all")
+        raise BagError(bag.path, f"{bag.topic(name)}: joints are {sorted(names)}", expected=f"{joint!r} in all")
     return next(iter(names)).index(joint)
 
 
 def _values(bag: Bag, name: str, messages: cdr.Messages, path: str, joint: int) -> Array:
     values = messages.numbers[path]
     if values.shape[1] <= joint:
-        raise BagError(bag.path, f"{topic(name)}: {path} has {values.shape[1]} values", expected=f"{joint + 1}")
+        raise BagError(bag.path, f"{bag.topic(name)}: {path} has {values.shape[1]} values", expected=f"{joint + 1}")
     return values[:, joint].astype(np.float64)
 
 

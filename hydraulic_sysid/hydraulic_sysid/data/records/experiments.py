@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hydraulic_interfaces.contract import FINISHED, STARTED, topic
+from hydraulic_interfaces.contract import FINISHED, STARTED
 from hydraulic_sim.arrays import Index
 from hydraulic_sysid.data.bag.experiment import ENDED
 from hydraulic_sysid.data.bag.reader import Bag
@@ -35,7 +35,7 @@ def spans(bag: Bag, stamps: Index) -> list[Span]:
 
     :raises BagError: all of them did.
     """
-    stream = bag.streams.get(topic("experiment"))
+    stream = bag.stream("experiment")
     said = map(json_data, stream.payloads if stream else ())
     events = [event for event in said if isinstance(event.get("stamp_ns"), int)]
     starts = [

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 NAMESPACE = "/actuator"
+"""Of a node that is not told otherwise (`-r __ns:=/left`): each actuator of a graph has a namespace of its own."""
 PLANT_NODE = "plant"
 EXCITATION_NODE = "excitation"
 RECORDER_NODE = "recorder"
@@ -32,7 +33,7 @@ STARTED, FINISHED, ABORTED = "started", "finished", "aborted"
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic; its name is relative to `NAMESPACE` unless it starts with "/"."""
+    """One topic; its name is relative to the namespace of the node unless it starts with "/"."""
 
     name: str
     type: str
@@ -43,7 +44,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Service:
-    """One service of the plant node: name (relative to `NAMESPACE`), type and what it does."""
+    """One service of the plant node: name (relative to its namespace), type and what it does."""
 
     name: str
     type: str
@@ -89,9 +90,9 @@ _TOPICS = {entry.name.removeprefix("/"): entry for entry in TOPICS}
 _SERVICES = {entry.name: entry for entry in SERVICES}
 
 
-def absolute(name: str) -> str:
-    """Full name of a topic, service or node that is written relative to `NAMESPACE`."""
-    return name if name.startswith("/") else f"{NAMESPACE}/{name}"
+def absolute(name: str, namespace: str = NAMESPACE) -> str:
+    """Full name of a topic, service or node that is written relative to a namespace."""
+    return name if name.startswith("/") else f"{namespace.rstrip('/')}/{name}"
 
 
 def find_topic(name: str) -> Topic:
@@ -102,9 +103,9 @@ def find_topic(name: str) -> Topic:
         raise KeyError(f"topic {name!r} is not in the contract; there are {', '.join(_TOPICS)}") from None
 
 
-def topic(name: str) -> str:
+def topic(name: str, namespace: str = NAMESPACE) -> str:
     """Full name of a topic of the contract: `topic("state")` is "/actuator/state"."""
-    return absolute(find_topic(name).name)
+    return absolute(find_topic(name).name, namespace)
 
 
 def service(name: str) -> str:

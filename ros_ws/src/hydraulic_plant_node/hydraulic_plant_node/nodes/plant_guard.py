@@ -34,23 +34,31 @@ class PlantGuard:
         self._node, self._gate, self._backend = node, gate, backend
         self._notices, self._counters = Notices(node.get_logger().warning), Counters()
         self._domain = node.context.get_domain_id()
-        self._claim = NameClaim(f"plant {self._domain} {node.get_fully_qualified_name()}")
+        self._claims: list[NameClaim] = []
         self._marker: RunMarker | None = None
         self._made, self._serves, self._watched = time.monotonic(), False, 0
         self.not_heard = ""
 
-    def enter(self, values: Mapping[str, Any]) -> None:
+    def enter(self, values: Mapping[str, Any], own_clock: bool) -> None:
         """Before the plant is configured with these parameters; a real one is stopped if its last run was not ended.
 
-        :raises BackendError: it may not be configured so, or another one serves the same topics.
+        :raises BackendError: it may not be configured so, or another one serves the same topics, time or hardware.
         """
-        if not self._claim.take():
-            raise BackendError(
-                f"another process is {self._node.get_fully_qualified_name()} in domain {self._domain}: end it, or give "
-                "this one another ROS_DOMAIN_ID"
+        name, clock = self._node.get_fully_qualified_name(), self._node.resolve_topic_name("/clock")
+        self._claim(
+            f"plant {self._domain} {self._node.get_namespace()}",
+            f"another process is {name} in domain {self._domain}: end it, or give this one a namespace of its own "
+            "(-r __ns:=/left) or another ROS_DOMAIN_ID",
+        )
+        if own_clock:
+            self._claim(
+                f"clock {self._domain} {clock}",
+                f"another plant publishes {clock} in domain {self._domain}: give every node a clock in its own "
+                "namespace (-r /clock:=clock)",
             )
         hardware = self._backend.hardware(values)
         if hardware:
+            self._claim(f"hardware {hardware}", f"another process drives the actuator on {hardware}: end it")
             time.sleep(max(self._made + _LOOK_AROUND_S - time.monotonic(), 0.0))
         self.check_alone()
         if reason := middleware.reach(os.environ, get_rmw_implementation_identifier()):
@@ -88,7 +96,8 @@ class PlantGuard:
             self._marker.end(self._gate.stop_reason)
             self._marker = None
         if not self._serves:  # else its publisher of `state` lives until the process ends
-            self._claim.give_back()
+            while self._claims:
+                self._claims.pop().give_back()
 
     def watch(self) -> None:
         """Stop the plant where there is another; log, once while it lasts, what is wrong with those that talk to it."""
@@ -109,6 +118,13 @@ class PlantGuard:
         if self._counters.moved("order", gate.counts[Verdict.OUT_OF_ORDER]):
             found["order"] = "commands are refused: they are not stamped later than the last one of their source"
         self._notices.tell(found)
+
+    def _claim(self, name: str, refusal: str) -> None:
+        if all(claim.name != name for claim in self._claims):
+            claim = NameClaim(name)
+            if not claim.take():
+                raise BackendError(refusal)
+            self._claims.append(claim)
 
     def _others(self) -> list[str]:
         """Nodes, without this one, that publish the state in its namespace."""

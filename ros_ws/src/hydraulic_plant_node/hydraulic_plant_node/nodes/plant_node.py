@@ -112,7 +112,7 @@ class PlantNode(LifecycleNode):
                 raise ValueError("use_sim_time is true: a plant follows no other clock, it may only publish one")
             factor = values.get("real_time_factor", 1.0)
             LoopTiming(1, factor, own_clock, lockstep)  # refuses what contradicts itself before anything is loaded
-            self._guard.enter(values)
+            self._guard.enter(values, own_clock)
             self.gate.watchdog = values["watchdog"]
             late = self._backend.configure(values)
             period_ns = round(1e9 / self._backend.sampling_rate(values))

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, String
 
-from hydraulic_interfaces.contract import RECORDER_NODE, absolute, find_topic
+from hydraulic_interfaces.contract import RECORDER_NODE, find_topic
 from hydraulic_interfaces.conversions import (
     ClockEncoder,
     MessageError,
@@ -80,7 +80,7 @@ class PlantPorts:
     def follow_recorders(self) -> None:
         """Hear from now on how far recorders are."""
         if self._recorders is None:
-            name = f"{absolute(RECORDER_NODE)}/status"
+            name = f"{RECORDER_NODE}/status"  # of the recorder beside it
             self._recorders = self._node.create_subscription(String, name, self._on_status, profile("latched"))
 
     def discard_commands(self) -> None:

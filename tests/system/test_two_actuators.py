@@ -1,0 +1,86 @@
+"""Two actuators in one graph, each in a namespace of its own: one in emergency stop, the other moves."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hydraulic_interfaces.conversions import from_time, reference_to_message
+from hydraulic_interfaces.samples import Reference
+from hydraulic_sysid.data.records import read_records
+from hydraulic_sysid.excitation import Plan, save_plan
+from hydraulic_sysid.excitation.signals.chirp import Chirp
+
+MODEL, RATE = "sample_bench", 250.0
+ON_ONE_GRAPH = {"/diagnostics", "/parameter_events", "/rosout"}
+NODES = {
+    ("plant", "/left"),
+    ("controller", "/left"),
+    ("plant", "/right"),
+    ("estimator", "/right"),
+    ("recorder", "/right"),
+    ("excitation", "/right"),
+}
+
+
+def short_plan(file: Path) -> Path:
+    timing = {"fade_in": 0.1, "fade_out": 0.1, "rest_before": 0.1, "rest_after": 0.1}
+    save_plan(Plan("short", Chirp(3.0, 1.0, 5.0, 1.0), 0.5, centring_gain=0.0, rate=RATE, **timing), file)
+    return file
+
+
+def test_one_stands_stopped_beside_one_that_moves(
+    launch: Any, client: Any, wait_until: Any, tmp_path: Path, compiled_physics: None
+) -> None:
+    def start(side: str, node: str, *flags: str, **parameters: object) -> Any:
+        values = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+        return launch(node, *flags, "--ros-args", "-r", f"__ns:=/{side}", "-r", "/clock:=clock", *values)
+
+    def plant(side: str) -> None:
+        values = {"model": MODEL, "lockstep": True, "rate": RATE, "watchdog": 0.5, "enable_on_activate": True}
+        start(side, "hydraulic_sim.nodes.simulator", "--autostart", **values)
+
+    states = {side: client.collect("state", namespace=f"/{side}") for side in ("left", "right")}
+    reference = client.publisher("reference", "/left")
+    plant("left"), plant("right")
+    start("left", "hydraulic_control.nodes.controller", autostart=True, gains="npid", age_limit=1.0, use_sim_time=True)
+    start("right", "hydraulic_sysid.nodes.estimator", model=MODEL)
+    end = {"stop_on_experiment_end": True, "exit_when_done": True}
+    recorder = start("right", "hydraulic_sysid.nodes.recorder", output=tmp_path / "bag", **end)
+
+    wait_until(lambda: states["left"] and reference.get_subscription_count(), "a state and a controller on the left")
+    assert client.call("std_srvs/srv/Trigger", "/left/emergency_stop").success
+    stopped = len(states["left"])
+
+    plan = {"plan": short_plan(tmp_path / "plan.yaml"), "state_timeout": 10.0, "listeners": 2}
+    excitation = start("right", "hydraulic_sysid.nodes.excitation", autostart=True, exit_when_done=True, **plan)
+    wait_until(lambda: set(client.node.get_node_names_and_namespaces()) >= NODES, "all nodes")
+    found = {name for name, _ in client.node.get_topic_names_and_types()} - ON_ONE_GRAPH
+    found |= {name for name, _ in client.node.get_service_names_and_types()}
+    assert {name for name in found if name.split("/")[1] not in ("left", "right", "test")} == set()
+    assert {"/left/clock", "/right/clock", "/right/recorder/status"} <= found
+
+    while excitation.popen.poll() is None:  # somebody wants the left one to move all the time
+        stamp_ns = from_time(states["left"][-1].header.stamp)
+        reference.publish(reference_to_message(Reference(stamp_ns, 0.05, 0.0)))
+        time.sleep(0.02)
+    assert (excitation.wait(), recorder.wait()) == (0, 0), excitation.output() + recorder.output()
+
+    (record,) = read_records(tmp_path / "bag")
+    assert np.ptp(record["position"]) > 5e-3 and np.abs(record["drive"]).max() > 2.0
+    assert {"/diagnostics"} == {name for name in recorded(tmp_path / "bag") if not name.startswith("/right/")}
+    assert recorded(tmp_path / "bag")["/right/predicted_state"] > len(record)
+    still = states["left"][stopped:]
+    assert len(still) > 100 and {state.effort[1] for state in still} == {0.0}
+    assert np.ptp([state.position[0] for state in still]) < 1e-6
+
+
+def recorded(bag: Path) -> dict[str, int]:
+    """Number of messages by topic, as the bag's metadata says."""
+    from rosbags.rosbag2 import Reader
+
+    with Reader(bag) as reader:
+        return {name: topic.msgcount for name, topic in reader.topics.items() if topic.msgcount}
