@@ -22,6 +22,7 @@ from hydraulic_sysid.linear.identification import identify
 from hydraulic_sysid.report import render, write_page
 from hydraulic_sysid.report.compare import figures as compare_figures
 from hydraulic_sysid.report.identify import figures as identify_figures
+from hydraulic_sysid.verbs import report as report_verb
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
 
@@ -181,6 +182,32 @@ def test_unreadable_results_are_named(tmp_path: Path, content: str, word: str) -
     path.write_text(content)
     with pytest.raises(results.ResultError, match=word):
         results.read_result(path)
+
+
+DAMAGE: dict[str, dict[str, Any]] = {
+    "something is missing": {"settings": {}},
+    "a text for a number": {"settings": {"horizon": "<b>long", "horizon_part": 0.5}},
+    "a number for a list": {"records": 3},
+    "half a character": {"title": "\ud800"},
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=list(DAMAGE))
+def test_what_does_not_hold_what_its_schema_promises_is_one_line(
+    tmp_path: Path, comparison: dict[str, Any], capsys: pytest.CaptureFixture[str], damage: dict[str, Any]
+) -> None:
+    (tmp_path / "compare.json").write_text(json.dumps({**comparison, **damage}))
+    assert report_verb.main([str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert "a result does not hold what its schema promises (hydraulic_sysid.compare/" in told
+    assert told.count("\n") == 1
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_brackets_without_end_are_no_json(tmp_path: Path) -> None:
+    (tmp_path / "x.json").write_text("[" * 200_000)
+    with pytest.raises(results.ResultError, match="not a JSON"):
+        results.read_result(tmp_path / "x.json")
 
 
 def test_unknown_version_is_refused(comparison: dict[str, Any]) -> None:

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any
 
 import plotly.graph_objects as go
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateRuntimeError
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
@@ -58,7 +58,8 @@ class Figures:
 def render(results: Sequence[Result]) -> str:
     """HTML of one page for the results, in the order given. It needs no other file and no network.
 
-    :raises ResultError: no result, or one of a schema that this version cannot show.
+    :raises ResultError: no result, one of a schema that this version cannot show, or one that lacks what its schema
+        promises.
     """
     if not results:
         raise ResultError("there is no result to show")
@@ -70,7 +71,15 @@ def render(results: Sequence[Result]) -> str:
         figures = _module(f"{folder}.figures")
         parts.append({"result": result, "template": f"{folder}/section.html.j2", "figures": figures})
     page = _environment().get_template("page.html.j2")
-    return page.render(parts=parts, place=Figures(), mark=Markup(PAGE_MARK), plotly=Markup(get_plotlyjs()))
+    try:
+        text = page.render(parts=parts, place=Figures(), mark=Markup(PAGE_MARK), plotly=Markup(get_plotlyjs()))
+        text.encode()  # JSON can hold halves of characters
+        return text
+    except (TemplateRuntimeError, LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        # Documents may come from anywhere, and this is where their content is first looked at.
+        schemas = ", ".join(str(result["schema"]) for result in results)
+        what = f"{type(error).__name__}: {error}"[:300]
+        raise ResultError(f"a result does not hold what its schema promises ({schemas}): {what}") from error
 
 
 def write_page(folder: Path, results: Sequence[Result]) -> Path:

@@ -19,7 +19,7 @@ def read_json(path: Path, error: type[HydraulicError]) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as problem:
         raise error(f"{path}: cannot be read ({problem.strerror})") from problem
-    except ValueError as problem:
+    except (ValueError, RecursionError) as problem:
         raise error(f"{path}: not a JSON document ({problem})") from problem
 
 
