@@ -1,9 +1,13 @@
-"""The launch file: its arguments and tables as they are written, and the description where ROS 2 launch is there."""
+"""The launch file: what it starts for which arguments, and how that runs where ROS 2 launch is installed."""
 
 from __future__ import annotations
 
 import ast
 import importlib.util
+import os
+import re
+import signal
+import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -11,6 +15,7 @@ from typing import Any
 import pytest
 import yaml
 
+from hydraulic_bringup import launched
 from hydraulic_bringup.demo import online
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_interfaces import contract
@@ -19,100 +24,78 @@ from hydraulic_sim.model_file import load_model
 ROOT = Path(__file__).resolve().parents[2]
 BRINGUP = ROOT / "ros_ws/src/hydraulic_bringup"
 FILE = BRINGUP / "launch/bench.launch.py"
-TREE = ast.parse(FILE.read_text(encoding="utf-8"))
-
-
-def constant(name: str) -> Any:
-    """Value of a table at the top of the launch file."""
-    (found,) = [n.value for n in TREE.body if isinstance(n, ast.Assign) and getattr(n.targets[0], "id", "") == name]
-    return ast.literal_eval(found)
-
-
-def calls(name: str) -> list[ast.Call]:
-    """All calls of a function or class."""
-    return [n for n in ast.walk(TREE) if isinstance(n, ast.Call) and getattr(n.func, "id", "") == name]
-
-
-def keyword(call: ast.Call, name: str) -> Any:
-    """A keyword argument that is written as a constant; None if it is computed or absent."""
-    values = [k.value for k in call.keywords if k.arg == name]
-    return values[0].value if values and isinstance(values[0], ast.Constant) else None
+DEFAULTS = {name: value for name, value, _ in launched.ARGUMENTS}
+EVERYTHING = [
+    {"record": "/tmp/bag", "experiment": "chirp", "estimate": "true"},
+    {"controller": "pid", "reference": "sine", "record": "/tmp/bag"},
+    {"plant": "can", "controller": "npid", "gains": "my.yaml", "enable": "True"},
+]
+REFUSED = [
+    ({"plant": "boat"}, "boat"),
+    ({"controller": "lqr"}, "lqr"),
+    ({"controller": "npid", "experiment": "chirp"}, "one of them"),
+    ({"reference": "step"}, "controller:="),
+    ({"enable": "maybe"}, "enable:=maybe: allowed are true and false"),
+]
 
 
 def test_arguments_are_described_and_have_defaults() -> None:
-    arguments = constant("ARGUMENTS")
-    names = [name for name, _, _ in arguments]
-    assert names == [
-        "plant", "model", "bus", "interface", "channel", "params", "enable", "record", "experiment", "controller",
-        "gains", "reference", "estimate",
-    ]  # fmt: skip
-    assert all(isinstance(default, str) and text for _, default, text in arguments)
-    defaults = {name: default for name, default, _ in arguments}
-    assert defaults["plant"] in constant("PLANTS")
-    assert defaults["enable"] == "false"  # nothing moves without being asked for
-    load_model(defaults["model"])
-    load_bus(defaults["bus"])
+    assert all(isinstance(default, str) and text for _, default, text in launched.ARGUMENTS)
+    assert DEFAULTS["enable"] == "false", "nothing moves without being asked for"
+    assert DEFAULTS["namespace"] == contract.NAMESPACE
+    load_model(DEFAULTS["model"])
+    load_bus(DEFAULTS["bus"])
 
 
 def test_both_plants_are_those_of_the_demo() -> None:
-    plants = {name: f"{package}.nodes.{executable}" for name, (package, executable) in constant("PLANTS").items()}
+    plants = {name: f"{package}.nodes.{executable}" for name, (package, executable) in launched.PLANTS.items()}
     assert plants == online.PLANTS
 
 
-@pytest.mark.parametrize("plant", ["sim", "can"])
-def test_the_plants_are_executables(plant: str) -> None:
-    package, executable = constant("PLANTS")[plant]
-    assert (ROOT / "ros_ws/src" / package / package / "nodes" / f"{executable}.py").is_file()
+def test_by_default_there_is_a_plant_alone() -> None:
+    assert launched.plant(DEFAULTS) == launched.Started(
+        "hydraulic_sim", "simulator", "plant", {"enable_on_activate": False, "model": DEFAULTS["model"]}
+    )
+    assert launched.others(DEFAULTS) == []
 
 
-def test_nodes_have_the_names_of_the_contract() -> None:
-    (plant,) = calls("LifecycleNode")
-    assert keyword(plant, "name") == contract.PLANT_NODE
-    assert keyword(plant, "namespace") == contract.NAMESPACE
-    (other,) = calls("Node")
-    assert keyword(other, "namespace") == contract.NAMESPACE
-    started = [tuple(a.value for a in call.args[:2] if isinstance(a, ast.Constant)) for call in calls("_node")]
-    assert {name for _, name in started} == {
+@pytest.mark.parametrize("chosen", EVERYTHING)
+def test_what_is_started_exists_and_declares_what_it_is_given(chosen: dict[str, str]) -> None:
+    pytest.importorskip("rclpy")
+    from hydraulic_plant_node.nodes import plant_node
+
+    values = DEFAULTS | chosen
+    for node in (launched.plant(values), *launched.others(values)):
+        module = importlib.import_module(f"{node.package}.nodes.{node.executable}")
+        declared = {spec.name: spec for spec in (*plant_node.PARAMETERS, *module.PARAMETERS)}
+        for name, value in node.parameters.items():
+            assert type(value) is type(declared[name].default), f"{node.name}: {name}"
+            declared[name].check(value)
+    assert {node.name for node in launched.others(values)} <= {
         contract.RECORDER_NODE, contract.EXCITATION_NODE, contract.ESTIMATOR_NODE, contract.CONTROLLER_NODE,
         contract.REFERENCE_NODE,
     }  # fmt: skip
-    for package, executable in started:
-        assert (ROOT / package / package / "nodes" / f"{executable}.py").is_file()
 
 
-def test_the_laws_are_those_of_the_controller() -> None:
+@pytest.mark.parametrize(("chosen", "complaint"), REFUSED)
+def test_what_cannot_be_started_is_refused(chosen: dict[str, str], complaint: str) -> None:
+    values = DEFAULTS | chosen
+    with pytest.raises(launched.ArgumentError, match=complaint):
+        launched.plant(values)
+        launched.others(values)
+
+
+def test_a_namespace_is_absolute_and_has_its_own_time() -> None:
+    assert launched.namespace(DEFAULTS) == "/actuator" and launched.remappings(DEFAULTS) == []
+    for given in ("left", "/left", "/left/"):
+        values = DEFAULTS | {"namespace": given}
+        assert launched.namespace(values) == "/left" and launched.remappings(values) == [("/clock", "clock")]
+
+
+def test_the_laws_have_gains() -> None:
     from hydraulic_control import gains_file, parameters
 
-    assert constant("CONTROLLERS") == parameters.CONTROLLERS
     assert set(parameters.CONTROLLERS) <= set(gains_file.shipped())
-
-
-def test_parameters_that_are_set_are_declared() -> None:
-    pytest.importorskip("rclpy")
-    from hydraulic_can_driver.nodes import can_driver
-    from hydraulic_control.nodes import controller, reference
-    from hydraulic_plant_node.nodes import plant_node
-    from hydraulic_sim.nodes import simulator
-    from hydraulic_sysid.nodes import estimator, excitation, recorder
-
-    declared = {
-        "plant": {s.name for s in (*plant_node.PARAMETERS, *simulator.PARAMETERS)},
-        "can": {s.name for s in (*plant_node.PARAMETERS, *can_driver.PARAMETERS)},
-        "recorder": {s.name for s in recorder.PARAMETERS},
-        "excitation": {s.name for s in excitation.PARAMETERS},
-        "controller": {s.name for s in controller.PARAMETERS},
-        "reference": {s.name for s in reference.PARAMETERS},
-        "estimator": {s.name for s in estimator.PARAMETERS},
-    }
-    keys = [
-        {k.value for k in node.keys if isinstance(k, ast.Constant)}
-        for node in ast.walk(TREE)
-        if isinstance(node, ast.Dict) and node.lineno > TREE.body[-1].lineno - 90
-    ]
-    settings = [found for found in keys if found and not found & set(constant("PLANTS"))]
-    assert len(settings) == 7
-    for found in settings:
-        assert any(found <= names for names in declared.values()), found
 
 
 @pytest.mark.parametrize("plant", ["sim", "can"])
@@ -124,7 +107,7 @@ def test_parameter_files_fit_their_nodes(plant: str) -> None:
 
     own = {"sim": simulator.PARAMETERS, "can": can_driver.PARAMETERS}[plant]
     specs = {s.name: s for s in (*plant_node.PARAMETERS, *own)}
-    file = yaml.safe_load((BRINGUP / "config" / constant("CONFIGURATIONS")[plant]).read_text(encoding="utf-8"))
+    file = yaml.safe_load((BRINGUP / "config" / launched.CONFIGURATIONS[plant]).read_text(encoding="utf-8"))
     assert list(file) == [f"/**/{contract.PLANT_NODE}"], "of a plant in any namespace"
     values = file[f"/**/{contract.PLANT_NODE}"]["ros__parameters"]
     assert set(values) <= set(specs)
@@ -135,10 +118,11 @@ def test_parameter_files_fit_their_nodes(plant: str) -> None:
 
 
 def test_what_it_imports_is_declared() -> None:
+    tree = ast.parse(FILE.read_text(encoding="utf-8"))
     manifest = (BRINGUP / "package.xml").read_text(encoding="utf-8")
-    modules = {(n.module or "").split(".")[0] for n in ast.walk(TREE) if isinstance(n, ast.ImportFrom)}
-    assert modules == {"launch", "launch_ros", "lifecycle_msgs", "hydraulic_node_utils"}
-    for module in modules:
+    modules = {(n.module or "").split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
+    assert {"launch", "launch_ros", "lifecycle_msgs"} < modules
+    for module in modules - {"hydraulic_bringup"}:
         assert f"<exec_depend>{module}</exec_depend>" in manifest
 
 
@@ -154,47 +138,51 @@ def description() -> ModuleType:
     return module
 
 
-def test_it_describes_its_arguments(description: ModuleType) -> None:
+@pytest.fixture
+def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The packages of this checkout as installed ones: their executables, and the parameter files."""
+    for name in ("hydraulic_bringup", "hydraulic_sim", "hydraulic_sysid", "hydraulic_control", "hydraulic_can_driver"):
+        marker = tmp_path / "prefix/share/ament_index/resource_index/packages" / name
+        marker.parent.mkdir(parents=True, exist_ok=True)
+        marker.touch()
+        folder = tmp_path / "prefix/lib" / name
+        folder.mkdir(parents=True)
+        for module in (ROOT / "ros_ws/src" / name / name / "nodes").glob("[!_]*.py"):
+            script = folder / module.stem
+            script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m {name}.nodes.{module.stem} "$@"\n')
+            script.chmod(0o755)
+    share = tmp_path / "prefix/share/hydraulic_bringup"
+    share.mkdir()
+    (share / "config").symlink_to(BRINGUP / "config")
+    there = os.environ.get("AMENT_PREFIX_PATH", "")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", os.pathsep.join(filter(None, (str(tmp_path / "prefix"), there))))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "ros_log"))
+
+
+def test_it_declares_its_arguments(description: ModuleType) -> None:
     arguments = description.generate_launch_description().get_launch_arguments()
-    assert [a.name for a in arguments] == [name for name, _, _ in constant("ARGUMENTS")]
+    assert [a.name for a in arguments] == list(DEFAULTS)
 
 
-def nodes_of(description: ModuleType, chosen: dict[str, str]) -> list[Any]:
-    """What is started for arguments that differ from their defaults."""
-    from launch import LaunchContext
-
-    context = LaunchContext()
-    context.launch_configurations.update({name: value for name, value, _ in constant("ARGUMENTS")} | chosen)
-    return list(description.generate_launch_description().entities[-1].execute(context))
+def test_a_refused_argument_ends_the_launch(description: ModuleType, launch: Any, prefix: None) -> None:
+    process = launch(ROOT / "tests/bringup/run_launch_file.py", "plant:=boat")
+    assert process.wait() != 0
+    assert "plant:=boat: allowed are sim, can" in process.output()
 
 
-@pytest.mark.parametrize(
-    ("chosen", "nodes"),
-    [
-        ({}, ["simulator"]),
-        ({"plant": "can"}, ["can_driver"]),
-        ({"estimate": "true"}, ["simulator", "estimator"]),
-        ({"record": "/tmp/bag", "experiment": "chirp"}, ["simulator", "recorder", "excitation"]),
-        ({"controller": "npid"}, ["simulator", "controller"]),
-        ({"controller": "pid", "reference": "sine"}, ["simulator", "controller", "reference"]),
-    ],
-)
-def test_it_starts_what_is_asked_for(description: ModuleType, chosen: dict[str, str], nodes: list[str]) -> None:
-    from launch_ros.actions import Node
-
-    started = [action for action in nodes_of(description, chosen) if isinstance(action, Node)]
-    assert [node.node_executable for node in started] == nodes
-
-
-@pytest.mark.parametrize(
-    ("chosen", "complaint"),
-    [
-        ({"plant": "boat"}, "boat"),
-        ({"controller": "lqr"}, "lqr"),
-        ({"controller": "npid", "experiment": "chirp"}, "one of them"),
-        ({"reference": "step"}, "controller:="),
-    ],
-)
-def test_what_cannot_be_started_is_refused(description: ModuleType, chosen: dict[str, str], complaint: str) -> None:
-    with pytest.raises(RuntimeError, match=complaint):
-        nodes_of(description, chosen)
+def test_a_plant_that_dies_takes_the_others_with_it(
+    description: ModuleType, launch: Any, prefix: None, client: Any, wait_until: Any, compiled_physics: None
+) -> None:
+    states = client.collect("state", namespace="/left")
+    arguments = ("model:=sample_bench", "namespace:=left", "controller:=npid", "estimate:=true")
+    process = launch(ROOT / "tests/bringup/run_launch_file.py", *arguments)
+    wait_until(lambda: states, "a state of the plant")
+    nodes = {("plant", "/left"), ("controller", "/left"), ("estimator", "/left")}
+    wait_until(lambda: set(client.node.get_node_names_and_namespaces()) >= nodes, "all nodes")
+    assert client.state("/left/plant") == client.state("/left/controller") == "active"
+    started = dict(re.findall(r"\[(\w+)-\d+\]: process started with pid \[(\d+)\]", process.output()))
+    assert set(started) == {"simulator", "controller", "estimator"}
+    os.kill(int(started["simulator"]), signal.SIGKILL)
+    process.wait()
+    for pid in started.values():
+        assert not Path("/proc", pid).exists()

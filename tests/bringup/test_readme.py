@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import ast
 import importlib
 import re
 import shlex
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
+from hydraulic_bringup import launched
 from hydraulic_bringup.entry.cli import verb_names
 from hydraulic_interfaces import contract
 from hydraulic_interfaces.conversions import interface_class
@@ -110,17 +110,6 @@ def check_node(module: str, arguments: list[str]) -> None:
             assert (ROOT / value).is_file()
 
 
-def launch_arguments() -> set[str]:
-    """Names of the arguments of bench.launch.py."""
-    text = (ROOT / "ros_ws/src/hydraulic_bringup/launch/bench.launch.py").read_text(encoding="utf-8")
-    (table,) = [
-        node.value
-        for node in ast.parse(text).body
-        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "ARGUMENTS"
-    ]
-    return {row[0] for row in ast.literal_eval(table)}
-
-
 @pytest.mark.parametrize("words", COMMANDS)
 def test_every_command_is_one(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     check_command(words, monkeypatch)
@@ -134,7 +123,7 @@ def check_command(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     if words[:2] == ["ros2", "launch"]:
         package, file, *settings = words[2:]
         assert (ROOT / "ros_ws" / "src" / package / "launch" / file).is_file()
-        assert {s.partition(":=")[0] for s in settings} <= launch_arguments()
+        assert {s.partition(":=")[0] for s in settings} <= {name for name, _, _ in launched.ARGUMENTS}
         return
     if words[:3] == ["ros2", "topic", "pub"]:
         name, kind, message = words[-3:]
