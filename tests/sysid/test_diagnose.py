@@ -9,7 +9,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
-from hydraulic_sysid.diagnosis.search.data_sheet import as_filed, relaxed
+from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, as_filed, beyond, relaxed
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
@@ -19,6 +19,7 @@ from hydraulic_sysid.diagnosis.search.search import (
     SearchResult,
     SearchState,
     absorbs_discrepancy,
+    decisive,
     varied,
     without_competitor,
 )
@@ -157,6 +158,36 @@ def test_what_an_effect_leaves_decides_whether_it_is_the_one(model, before: floa
     base, final = state(model, 3000 * before, {}), state(with_it, 3000 * after, {})
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     assert verdict.kind_of(found, tied=False) == kind
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "named"),
+    [
+        (1.04, 1.032, False),  # what was left would be called complete, and most of it stays
+        (1.04, 1.0, True),
+        (1.39, 1.2, True),  # something was missing: the verdict says how well it is explained
+    ],
+)
+def test_where_nothing_need_be_missing_an_effect_must_explain_what_is_left(model, before, after, named) -> None:
+    base, final = state(model, 3000 * before, {}), state(model.with_effect("constant_load"), 3000 * after, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
+    assert bool(decisive(found).added) is named
+    assert decisive(found).final is (final if named else base)
+
+
+def test_a_fit_with_a_number_at_its_bound_is_also_begun_beyond_it(model) -> None:
+    low, high = model.entry("moving_mass").bounds
+    (start,) = beyond(model, {"moving_mass": "highest", "viscous_friction.coefficient": "highest"})
+    assert high < start.value("moving_mass") < start.entry("moving_mass").bounds[1]
+    assert start.value("viscous_friction.coefficient") == model.value("viscous_friction.coefficient")
+    (start,) = beyond(model, {"moving_mass": "lowest"})
+    assert start.entry("moving_mass").bounds[0] < start.value("moving_mass") < low
+    assert beyond(model, {}) == []
+
+
+def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:
+    assert not Deviation("dead_volume_a", 200e-6, 202e-6, 2.1e-6, 2000.0).sure
+    assert Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0).sure
 
 
 @pytest.mark.parametrize(

@@ -114,6 +114,7 @@ def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> Non
     assert fault["name"] == "pressures" and fault["channels"] == ["pressure_a", "pressure_b"]
     assert fault["size"] == pytest.approx(2.0 * DT, rel=0.1)
     assert "late" in found["verdict"]["text"]
+    assert found["residual"]["before"]["validation"] > 1.2 * found["residual"]["after"]["validation"]
     assert_cannot_inject(found)
 
 

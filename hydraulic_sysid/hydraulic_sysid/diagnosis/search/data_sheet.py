@@ -7,7 +7,7 @@ that have to move are named, by the cost of holding the others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,7 @@ LEAST_PRESSURE = 1e5  # Pa, of a tank pressure near 0
 NAMED = ("piston_area_a", "piston_area_b", "dead_volume_a", "dead_volume_b", "supply_pressure", "tank_pressure")
 """Base parameters that a data sheet states and a diagnosis leaves as they are."""
 SIGNIFICANT = 25.0  # reduction of the sum of squares, of the variance, for which a number is named …
+SURE = 2.0  # standard errors by which a number must be off to be named
 VISIBLE = 0.01  # … at least this share of the number of residuals
 
 
@@ -40,6 +41,11 @@ class Deviation:
     standard_error: float
     cost: float
     instead: tuple[str, ...] = ()
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is another number than that of the model file, beyond its error."""
+        return abs(self.value - self.nominal) > SURE * self.standard_error
 
 
 def relaxed(model: Model) -> Model:
@@ -59,6 +65,21 @@ def relaxed(model: Model) -> Model:
         bounds = (max(low, record.bounds[0]), min(high, record.bounds[1]))
         model = model.with_entry(key, free=True, bounds=bounds)
     return model
+
+
+def beyond(model: Model, at_bound: Mapping[str, str]) -> list[Model]:
+    """The `relaxed` model, all base parameters that ended at a bound of the model file half-way beyond it.
+
+    A resonance has many local minima: with a mass far off, a fit that may move it does not find it. None where no
+    parameter is at a bound that gives way.
+    """
+    loose, values = relaxed(model), {}
+    for key, end in at_bound.items():
+        own, wide = model.entry(key).bounds, loose.entry(key).bounds
+        if own is not None and wide is not None and own != wide:
+            i = int(end == "highest")
+            values[key] = (own[i] * wide[i]) ** 0.5
+    return [loose.with_values(values)] if values else []
 
 
 def priors(given: Model) -> Priors:

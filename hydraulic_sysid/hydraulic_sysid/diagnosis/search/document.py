@@ -13,11 +13,11 @@ from hydraulic_sysid.diagnosis.compare.document import model_document
 from . import verdict as verdicts
 from .candidates import subsystem
 from .holdout import BLOCK, EVERY
-from .misfit import Misfit
+from .misfit import UNSEEN, Misfit, unexplained
 from .nonparametric_curves import NonparametricCurve
 from .search import SearchResult
 from .uncertainty import Known
-from .verdict import MISSING, OUTSIDE, UNSEEN, Verdict
+from .verdict import MISSING, OUTSIDE, Verdict
 from .worst_segments import worst_segments
 
 _NEAREST = 3
@@ -70,7 +70,7 @@ def document(
         },
         "residual": {
             "unit": "residual over noise",
-            "before": _residual(result.base.misfit),
+            "before": _residual(result.before),
             "after": _residual(final.misfit),
             "after_each_effect": [{"name": name, **_residual(after)} for name, after in result.misfits.items()],
         },
@@ -134,7 +134,7 @@ def document(
             for r in result.remainders
         ],
         "parameters": _parameters(final.model, known, final.linearisation.parameters.keys),
-        "unexplained_share": verdicts.unexplained_share(result),
+        "unexplained_share": unexplained(result.base.misfit, result.final.misfit),
         "nonparametric_curves": [_curve(c) for c in curves],
         "nearest_effects": [r.name for r in final.refits[:_NEAREST]] if outside else [],
         "balances": [],

@@ -16,6 +16,9 @@ SIGNIFICANT = 25.0  # reduction of the sum of squares, of the present variance, 
 CONFIRMED = 10.0  # … and on those for validation
 WORST = 0.05  # of all segments, at least one, that do not count for whether something is missing at all
 BEST = 0.02  # of all segments, at least one, without which a reduction must be one, too
+UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
+LITTLE = 1.03  # residual over noise up to which nothing need be missing
+SMALL_UNEXPLAINED = 0.4  # share of it that effects may leave where little was left before
 VISIBLE = 5e-4  # over all residuals, of their present variance: a smaller one is a matter of laws, not of effects
 
 
@@ -65,6 +68,16 @@ class Misfit:
     def excess(self) -> float:
         """What of the sum of squares noise does not explain."""
         return max(self.total - self.count, 0.0)
+
+    @property
+    def usual(self) -> float:
+        """Mean square over noise, whatever the worst segments leave."""
+        return min(self.variance, self.typical)
+
+    @property
+    def little(self) -> bool:
+        """Whether so little is left that nothing need be missing."""
+        return self.usual <= LITTLE**2
 
     @property
     def least(self) -> float:
@@ -118,6 +131,12 @@ def explained(before: Misfit, after: Misfit) -> float:
         gain = float((before.by_segment - after.by_segment)[kept].sum())
         excess = float((before.by_segment - before.counted)[kept].sum())
     return gain / max(excess, 1e-9 * before.total, gain)
+
+
+def unexplained(before: Misfit, after: Misfit) -> float:
+    """Mean square that is surely beyond the noise, over that before (0…1)."""
+    first, last = (max(m.usual - 1.0 - UNSEEN, 0.0) for m in (before, after))
+    return last / first if first > 0.0 else 0.0
 
 
 def _comparable(before: Misfit, after: Misfit) -> bool:

@@ -22,13 +22,13 @@ from hydraulic_sysid.estimation.parameters import bounded
 from hydraulic_sysid.estimation.refinement import refined, usable
 
 from .candidates import candidates, observed, subsystem
-from .data_sheet import Deviation, priors, relaxed, restored, significant, suspects
+from .data_sheet import Deviation, beyond, priors, relaxed, restored, significant, suspects
 from .drive_faults import costs_with
 from .errors import DiagnosisError
 from .frozen_jacobian import Refit, as_it_is, refit
 from .holdout import Split, split
 from .linearisation import Linearisation
-from .misfit import Misfit, explained, material, misfit
+from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material, misfit, unexplained
 from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import Remainder, Spikes, negligible, remainders, spikes
 from .score_test import CandidateScore, score
@@ -119,7 +119,8 @@ class SearchResult:
     """Where a search ended.
 
     ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
-    ``competing[name]``: the state without that effect, with what was tried in its place.
+    ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the misfit
+    before any fault of the recording was assumed.
     """
 
     model: Model
@@ -131,6 +132,12 @@ class SearchResult:
     competing: dict[str, SearchState]
     moved: Sequence[Deviation] = ()
     faults: Sequence[RecordingFault] = ()
+    as_recorded: Misfit | None = None
+
+    @property
+    def before(self) -> Misfit:
+        """What the model left before anything was explained."""
+        return self.as_recorded or self.base.misfit
 
     @property
     def added(self) -> list[str]:
@@ -159,6 +166,7 @@ class Search:
     def __init__(self, model: Model, split: Split, settings: FitSettings, say: Say) -> None:
         self.given, self.split, self.settings, self.say = model, split, settings, say
         self.faults: list[RecordingFault] = []
+        self.as_recorded: Misfit | None = None
         self.priors = priors(model)
         self._first = replace(settings, least_gain=FIRST_GAIN)
         self._last = replace(settings, most_steps=LAST_STEPS, least_gain=LAST_GAIN)
@@ -186,7 +194,9 @@ class Search:
         if strict.misfit.variance < LOOSE:
             return strict
         self.say("fitting the model within the tolerances of its data sheet")
-        before, loose = self.split, self.state(relaxed(strict.model), self._last)
+        before = self.split
+        starts = [relaxed(strict.model), *beyond(strict.model, strict.linearisation.parameters.at_bound)]
+        loose = min((self.state(m, self._last) for m in starts), key=lambda s: s.misfit.total)
         if material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER:
             return self.judged(loose)
         self.split = before
@@ -224,6 +234,7 @@ class Search:
             found = min((self.with_fault(base, f) for f in near), key=lambda f: f.misfit.total)
             if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
+            self.as_recorded = self.as_recorded or base.misfit
             self.faults = together(self.faults, found.fault)
             self.split = found.split
             base = self.judged(found.state)
@@ -280,7 +291,15 @@ class Search:
             best, deviation = min(tried, key=lambda t: t[0].misfit.total, default=(done, None))
             if deviation is None or not significant(deviation.cost, best.misfit.count, best.misfit.variance):
                 break
-            moved, done = [*moved, replace(deviation, value=best.model.value(deviation.key))], best
+            deviation = replace(deviation, value=best.model.value(deviation.key))
+            if deviation.sure:
+                moved, done = [*moved, deviation], best
+                continue
+            # It is where it was: what the fit gained came from the others, which had stopped short.
+            back = self.state(restored(best.model, self.given, named), self._last)
+            if done.misfit.total - back.misfit.total < done.misfit.least:
+                break
+            done = back
         moved = [replace(d, instead=self.instead(bare, done, d, moved)) for d in moved]
         misfits = found.misfits
         if misfits:
@@ -366,19 +385,23 @@ class Search:
 
     def run(self) -> SearchResult:
         """Search until the noise by which it judged is the noise that its result leaves."""
+        return self.concluded(decisive(self.searched()))
+
+    def searched(self) -> SearchResult:
+        """The search itself, the data sheet as loose as it was taken."""
         found = self.forward(self.recorded(self.begin()))
         if not found.added:
-            return self.concluded(found)
+            return found
         before = self.split
         self.judged(self.state(found.final.model, self._last))
         if not quieter(before, self.split) and not retimed(before, self.split):
             self.split = before
-            return self.concluded(found)
+            return found
         self.say("searching on: what was taken for noise or small delays was partly what is missing")
         base, tried = self.state(found.base.model, self._last), [r.name for r in found.base.refits[:LATER_REFITS]]
         refits = [self.refit(base, s) for s in found.base.scores if s.effect.name in tried]
         base = replace(base, refits=sorted(refits, key=lambda r: r.misfit.total), scores=found.base.scores)
-        return self.concluded(self.forward(base, self.state(found.final.model, self._last)))
+        return self.forward(base, self.state(found.final.model, self._last))
 
     def forward(self, base: SearchState, known: SearchState | None = None) -> SearchResult:
         """Forward from the base or from what is ``known``, backward, and every effect added against its competitors."""
@@ -408,9 +431,8 @@ class Search:
             final, kept, competing = self._reviewed(base, final, added, competing)
             if kept != added or len(misfits) < len(kept):
                 misfits = self._misfits(base, final, kept)
-        return SearchResult(
-            self.given, self.split, self.settings, base, final, misfits, competing, faults=tuple(self.faults)
-        )
+        found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
+        return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
 
     def add(self, name: str) -> SearchResult:
         """One effect on top of the model, whatever it explains.
@@ -475,6 +497,14 @@ class Search:
             model = model.with_effect(name, {p: final.model.value(f"{name}.{p}") for p in own})
             found[name] = self.state(model).misfit
         return {**found, **{name: final.misfit for name in order[-1:]}}
+
+
+def decisive(found: SearchResult) -> SearchResult:
+    """A search without its effects where so little was left that none need be missing, and they leave much of that."""
+    base, final = found.base.misfit, found.final.misfit
+    if found.added and base.little and unexplained(base, final) > SMALL_UNEXPLAINED:
+        return replace(found, final=found.base, misfits={}, competing={})
+    return found
 
 
 def together(faults: Sequence[RecordingFault], found: RecordingFault) -> list[RecordingFault]:

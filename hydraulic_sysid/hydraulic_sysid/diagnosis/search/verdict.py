@@ -15,6 +15,7 @@ from hydraulic_sysid.estimation.parameters import Parameters
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
 from .drive_faults import DriveHypothesis
+from .misfit import SMALL_UNEXPLAINED, UNSEEN, unexplained
 from .nonparametric_curves import NonparametricCurve
 from .remainder import Remainder, negligible
 from .search import SearchResult
@@ -34,14 +35,11 @@ MANY_SPIKES = 1e-4  # of all samples: more are a fault of the recording
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
 VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave
-UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
-SMALL = 1.2  # mean square over noise below which more may be left …
-SMALL_UNEXPLAINED = 0.4  # … namely this share
+SMALL = 1.2  # mean square over noise below which a larger share may be left
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
 BELOW = 0.9  # residual over noise below which the noise model is doubted
-LARGE = 1.03  # residual over noise from which something is missing although no effect of the library is
 
 
 @dataclass(frozen=True)
@@ -116,26 +114,19 @@ def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dic
     return found
 
 
-def unexplained_share(result: SearchResult) -> float:
-    """Mean square beyond the noise, over that before anything was added (0…1)."""
-    ends = (result.base.misfit, result.final.misfit)
-    before, after = (max(min(m.variance, m.typical) - 1.0 - UNSEEN, 0.0) for m in ends)
-    return after / before if before > 0.0 else 0.0
-
-
 def kind_of(result: SearchResult, tied: bool) -> str:
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added."""
     final = result.final.misfit
-    typical = min(final.variance, final.typical)
-    little = typical <= LARGE**2 or (typical <= SMALL and negligible(result.remainders))
+    left = unexplained(result.base.misfit, final)
+    little = final.little or (final.usual <= SMALL and negligible(result.remainders))
     if not result.added:
-        if not little and unexplained_share(result) > UNEXPLAINED:
+        if not little and left > UNEXPLAINED:
             return RECORDING if drive_unknown(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
     allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if final.variance < SMALL else UNEXPLAINED
-    if unexplained_share(result) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
+    if left > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
     return INDISTINGUISHABLE if tied else MISSING
 
@@ -169,7 +160,7 @@ def place(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparametric
 
 def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
     """What a user reads first."""
-    base, final = result.base.misfit.rms_validation, result.final.misfit.rms_validation
+    base, final = result.before.rms_validation, result.final.misfit.rms_validation
     left = " ".join([remainder_sentence(result.remainders), *noise_sentences(result)])
     aside = set_aside_sentences(result.split.set_aside)
     fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
