@@ -24,8 +24,9 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
     ],
     zip_safe=False,
+    extras_require={"test": ["pytest"]},
     maintainer="Hydraulic Bench Maintainers",
-    maintainer_email="maintainers@hydraulic-bench.example.org",
+    maintainer_email="maintainers@users.noreply.h-seed-4219f506.example",
     license="Apache-2.0",
     entry_points={"console_scripts": executables()},
 )

@@ -22,6 +22,7 @@ from hydraulic_bringup.entry.ros import Ros
 ROOT = Path(__file__).resolve().parents[2]
 ENTRY = Path("ros_ws/src/hydraulic_bringup/hydraulic_bringup")
 PATIENCE_S = 150.0
+TIMING = "pytest.mark" + ".timing"
 
 # Stands for the interpreter of the environment: writes down how it was called, and does colcon's work.
 FAKE_PYTHON = """#!/bin/sh
@@ -383,7 +384,7 @@ def test_failed_build_says_which_why_and_what_to_do_and_is_tried_again(checkout:
 
 
 def test_all_tests_run_those_of_the_wall_clock_last_and_the_closing_line_sums_up(built: FakeCheckout) -> None:
-    for name, text in (("pace", "@pytest.mark.timing"), ("seal", "")):
+    for name, text in (("pace", f"@{TIMING}"), ("seal", "")):
         file = built.root / f"tests/pump/test_{name}.py"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)
@@ -423,6 +424,18 @@ def test_only_tests_of_the_wall_clock_are_repeated(built: FakeCheckout) -> None:
     assert answer.returncode == 0
     assert "test_seal.py F" in answer.stdout
     assert answer.stdout.splitlines()[-1].startswith("=== 6 passed, 3 repeated, 1 warnings in ")
+
+
+def test_what_protects_the_bench_is_not_among_them() -> None:
+    """Gate, faults, contract and control have to pass at once; a further file gets here on purpose or not at all."""
+    files = [file for file in (ROOT / "tests").rglob("test_*.py") if TIMING in file.read_text()]
+    assert {str(file.relative_to(ROOT / "tests")) for file in files} == {
+        "can_driver/test_sync.py",
+        "plant_node/test_lockstep.py",
+        "plant_node/test_plant_loop.py",
+        "system/test_vcan.py",
+    }
+    assert not re.search(r"rerun|flaky|repeat", (ROOT / "pyproject.toml").read_text().partition("[tool.")[0])
 
 
 @pytest.mark.parametrize("marker", ["not timing", "timing"])

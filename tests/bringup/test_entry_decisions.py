@@ -16,12 +16,14 @@ from typing import Any
 
 import pytest
 
-from hydraulic_bringup.entry import environment_plan, virtualenv
+from hydraulic_bringup.entry import environment_plan, host, virtualenv
 from hydraulic_bringup.entry.bench import Bench, with_home
 from hydraulic_bringup.entry.checkout import Checkout
 from hydraulic_bringup.entry.environment import build_variables, command_variables, joined
 from hydraulic_bringup.entry.environment_plan import CHECKING, INSTALLING, READY, Plan, Stamp, pins, plan
 from hydraulic_bringup.entry.errors import BenchError
+from hydraulic_bringup.entry.findings import MISSING
+from hydraulic_bringup.entry.probes import python_environment
 from hydraulic_bringup.entry.ros import Ros, sourced, without_foreign
 from hydraulic_bringup.entry.steps import Progress, run_step, telling_lines
 from hydraulic_bringup.entry.workspace import fingerprint, staleness
@@ -133,6 +135,25 @@ def test_python_that_does_not_fit_the_sourced_ros_is_refused(tmp_path: Path) -> 
         environment_plan.wanted(make_checkout(tmp_path), Ros(Path("/opt/ros/jazzy"), (3, 99)), named=True)
     with pytest.raises(BenchError, match=r"needs Python 3\.99, which is not on the PATH"):
         environment_plan.wanted(make_checkout(tmp_path / "b"), Ros(Path("/opt/ros/jazzy"), (3, 99)), named=False)
+
+
+@pytest.mark.parametrize(("system", "name"), [("darwin", "macOS"), ("win32", "Windows"), ("freebsd14", "freebsd14")])
+def test_other_systems_are_told_so(system: str, name: str) -> None:
+    host.check_system("linux")
+    with pytest.raises(BenchError, match=f"runs on Linux; this is {name}"):
+        host.check_system(system)
+
+
+def test_other_processors_need_a_ros_of_their_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("platform.machine", lambda: "aarch64")
+    checkout = make_checkout(tmp_path)
+    with pytest.raises(BenchError, match="no ROS 2 wheels for aarch64: they are for Linux on x86-64 alone") as refused:
+        Bench(checkout, {}).prepare()
+    assert "source" in refused.value.remedy and not checkout.venv.exists()
+    (finding,) = python_environment.probe(Bench(checkout, {}))
+    assert finding.state == MISSING and "aarch64" in finding.found
+    host.check_machine("aarch64", Ros(Path("/opt/ros/jazzy"), (3, 12)))
+    host.check_machine("x86_64", Ros())
 
 
 class Steps:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 WORKSPACE = ROOT / "ros_ws"
@@ -93,6 +94,11 @@ def test_setup_and_manifest_agree(name: str, monkeypatch: pytest.MonkeyPatch) ->
     installed = {target: files for target, files in handed["data_files"]}
     assert installed["share/ament_index/resource_index/packages"] == [f"resource/{name}"]
     assert "package.xml" in installed[f"share/{name}"]
+
+
+def test_all_packages_have_one_maintainer_who_is_not_made_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    (address,) = {setup_arguments(name, monkeypatch)["maintainer_email"] for name in NAMES}
+    assert not re.search(r"@(.+\.)?example\.(com|org|net)$", address)
 
 
 def test_all_packages_have_one_version(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,19 +182,77 @@ def test_manifest_declares_the_ros_packages_that_are_imported(name: str) -> None
     assert (imported & ROS_MODULES) - {name} <= declared
 
 
+ROSDEP = {
+    "can": "python3-can",
+    "canopen": "canopen-pip",
+    "control": "python-control-pip",
+    "jinja2": "python3-jinja2",
+    "numba": "python3-numba",
+    "numpy": "python3-numpy",
+    "rich": "python3-rich",
+    "rosbags": "python3-rosbags-pip",
+    "ruamel": "python3-ruamel.yaml",
+    "scipy": "python3-scipy",
+}
+"""Keys of rosdep (rosdistro of August 2026, Ubuntu) by what is imported."""
+WITHOUT_KEY = {"markupsafe", "mcap", "pint", "plotly", "zstandard"}
+TEST_KEYS = {"domain_coordinator", "python3-hypothesis", "python3-pytest", "python3-pytest-timeout"}
+
+
 @every_package
 def test_manifest_names_the_libraries_that_are_imported(name: str) -> None:
     """As rosdep keys, or in the comment that says what rosdep does not know."""
+    catkin_pkg = pytest.importorskip("catkin_pkg.package")
+    package = catkin_pkg.parse_package(str(PACKAGES[name]))
     text = (PACKAGES[name] / "package.xml").read_text(encoding="utf-8")
-    keys = set(re.findall(r"<exec_depend>python3-(.+?)(?:-pip)?</exec_depend>", text))
     comment = re.search(r"installed from pyproject.toml: (.+?)\. -->", text)
-    named = keys | set(comment[1].split(", ") if comment else ())
+    modules = {module for file in sources(name) for module in imports_of(file)}
     owners = packages_distributions()
-    for file in sources(name):
-        for module in imports_of(file) - sys.stdlib_module_names - set(NAMES) - ROS_MODULES:
-            candidates = {owner.lower().removeprefix("py") for owner in owners.get(module, [module])}
-            of_ros = any(owner.startswith("ros-") for owner in owners.get(module, []))
-            assert of_ros or {*candidates, module} & named, f"{file.relative_to(ROOT)}: {module} is not in package.xml"
+    libraries = {
+        module
+        for module in modules - sys.stdlib_module_names - set(NAMES) - ROS_MODULES
+        if not any(owner.startswith("ros-") for owner in owners.get(module, []))
+    }
+    assert libraries <= set(ROSDEP) | WITHOUT_KEY
+    assert {dependency.name for dependency in package.exec_depends} >= {ROSDEP[m] for m in libraries & set(ROSDEP)}
+    assert set(comment[1].split(", ") if comment else ()) == libraries & WITHOUT_KEY
+    keys = {dependency.name for dependency in package.exec_depends if "-" in dependency.name}
+    assert keys <= set(ROSDEP.values()), "no key that rosdep does not know"
+    assert {dependency.name for dependency in package.test_depends} == TEST_KEYS
+
+
+@every_package
+def test_colcon_runs_the_tests_of_the_package(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert setup_arguments(name, monkeypatch)["extras_require"] == {"test": ["pytest"]}, "by pytest"
+    option, settings, *folders = yaml.safe_load((PACKAGES[name] / "colcon.pkg").read_text())["pytest-args"]
+    home = PACKAGES[name].resolve()
+    assert (option, (home / settings).resolve()) == ("-c", ROOT / "pyproject.toml")
+    assert folders and all(any((home / folder).glob("test_*.py")) for folder in folders)
+
+
+def test_colcon_runs_all_tests() -> None:
+    files = [folder.resolve() / "colcon.pkg" for folder in PACKAGES.values()]
+    run = [(f.parent / at).resolve() for f in files for at in yaml.safe_load(f.read_text())["pytest-args"][2:]]
+    assert sorted(run) == sorted({file.parent for file in (ROOT / "tests").rglob("test_*.py")})
+
+
+def test_colcon_test_runs_them(tmp_path: Path) -> None:
+    pytest.importorskip("colcon_ros")
+    if not (WORKSPACE / "install/hydraulic_interfaces/share/hydraulic_interfaces/package.sh").is_file():
+        pytest.skip("the workspace was not built")
+    colcon = "import sys; from colcon_core.command import main; sys.exit(main())"
+    chosen = ["--base-paths", "src", "--packages-select", "hydraulic_interfaces"]
+    results = ["--test-result-base", str(tmp_path), "--event-handlers", "console_direct+"]
+    tried = subprocess.run(
+        [sys.executable, "-c", colcon, "--log-base", str(tmp_path / "log"), "test", *chosen, *results]
+        + ["--pytest-args", " -k", "test_clock_encoder"],
+        cwd=WORKSPACE,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert tried.returncode == 0 and "1 passed" in tried.stdout, tried.stdout + tried.stderr
+    assert 'failures="0"' in (tmp_path / "hydraulic_interfaces/pytest.xml").read_text()
 
 
 def test_colcon_knows_all_packages_as_ros_packages(tmp_path: Path) -> None:

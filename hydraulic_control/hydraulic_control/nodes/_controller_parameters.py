@@ -12,6 +12,7 @@ from hydraulic_control import gains_file
 from hydraulic_control.parameters import LAW, SPECS
 from hydraulic_control.session import ControlSession
 from hydraulic_node_utils.nodes.parameters import ParameterTable
+from hydraulic_node_utils.nodes.rclpy_internals import given_at_start
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 SAFETY: tuple[ParameterSpec, ...] = (
@@ -56,7 +57,7 @@ class ControllerParameters:
         gains = self.table["gains"]
         if not gains or gains == self._loaded:
             return
-        given = self._node._parameter_overrides
+        given = given_at_start(self._node)
         values = {name: value for name, value in gains_file.load(gains).items() if name not in given}
         self._session.controller.set(values)  # all at once: one by one they need not go together
         for result in self._node.set_parameters([Parameter(name, value=value) for name, value in values.items()]):

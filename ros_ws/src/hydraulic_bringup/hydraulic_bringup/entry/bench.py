@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import pwd
 import signal
 import sys
@@ -10,7 +11,7 @@ import tempfile
 import time
 from collections.abc import Mapping
 
-from . import environment_plan, virtualenv, workspace
+from . import environment_plan, host, virtualenv, workspace
 from .checkout import Checkout
 from .environment import build_variables, command_variables
 from .lock import exclusive
@@ -59,8 +60,9 @@ class Bench:
     def needed_environment(self) -> environment_plan.Stamp:
         """The virtual environment this call needs.
 
-        :raises BenchError: the sourced ROS 2 needs a Python that is not there
+        :raises BenchError: the sourced ROS 2 needs a Python that is not there, or there is no ROS 2 for this machine
         """
+        host.check_machine(platform.machine(), self.ros)
         return environment_plan.wanted(self.checkout, self.ros, named=bool(self.environ.get("BENCH_PYTHON")))
 
     def stale_packages(self) -> dict[str, str]:

@@ -10,7 +10,7 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from hydraulic_node_utils.nodes import middleware
+from hydraulic_node_utils.nodes import middleware, rclpy_internals
 from hydraulic_node_utils.nodes.log_callers import know_log_callers
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
@@ -29,10 +29,14 @@ def start(options: argparse.ArgumentParser, argv: list[str] | None) -> argparse.
     """Read the command line (`argv`, or that of the process) and start rclpy, found on this machine only.
 
     To be called before the node is made, while nothing is kept waiting yet. Signals are left to the caller.
-    Leaves with exit code 2 for options that do not exist or are malformed.
+    Leaves with exit code 2 for options that do not exist or are malformed, and on an rclpy that the nodes cannot use.
     """
     arguments = sys.argv if argv is None else [sys.argv[0], *argv]
     middleware.set_up()
+    try:
+        rclpy_internals.check()
+    except rclpy_internals.RclpyVersionError as error:
+        options.exit(2, f"{error}\n")
     try:
         given = options.parse_args(remove_ros_args(arguments)[1:])
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
+
+from hydraulic_node_utils.nodes.rclpy_internals import change_state_service
 
 
 def guard_transitions(node: LifecycleNode) -> None:
@@ -14,13 +15,13 @@ def guard_transitions(node: LifecycleNode) -> None:
     Without this, rclpy raises out of the executor and the client waits for ever: a stray `activate` would
     take an active plant down.
     """
-    service = node._service_change_state
+    service = change_state_service(node)
     change_state = service.callback
 
     def guarded(request: Any, response: Any) -> Any:
         try:
             return change_state(request, response)
-        except rclpy_implementation.RCLError as error:
+        except RuntimeError as error:  # of which the errors of rcl are
             node.get_logger().warning(f"transition refused: {error}")
             response.success = False
             return response

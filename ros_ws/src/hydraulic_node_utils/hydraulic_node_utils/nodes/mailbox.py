@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+
+from hydraulic_node_utils.nodes import rclpy_internals
 
 
 class _NotServed(CallbackGroup):
@@ -44,7 +45,7 @@ class Mailbox:
     def wait(self, seconds: float) -> None:
         """Return when a message waits, or after that time."""
         if self._wait_set is None:
-            self._wait_set = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, self._context.handle)
+            self._wait_set = rclpy_internals.wait_set(self._context)
         with self._subscription.handle:
             self._wait_set.clear_entities()
             self._wait_set.add_subscription(self._subscription.handle)

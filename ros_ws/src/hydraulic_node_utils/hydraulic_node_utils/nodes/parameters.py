@@ -9,6 +9,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from hydraulic_node_utils.nodes.rclpy_internals import given_at_start
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 # Stands for "unbounded" in a descriptor, which knows no infinity.
@@ -71,7 +72,7 @@ class ParameterTable:
 
     def warn_of_unknown(self) -> None:
         """Log a warning for each value given at the start of the node that no declared parameter has taken."""
-        for name in self._node._parameter_overrides:
+        for name in given_at_start(self._node):
             if not self._node.has_parameter(name):
                 self._node.get_logger().warning(f"no parameter has the name {name!r}: the value given is not used")
 
