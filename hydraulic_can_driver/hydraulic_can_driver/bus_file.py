@@ -34,6 +34,7 @@ from hydraulic_can_driver.bus import (
 from hydraulic_can_driver.codec import raw_range
 from hydraulic_can_driver.eds_check import check_against_eds
 from hydraulic_can_driver.errors import BusFileError
+from hydraulic_node_utils.yaml_text import load_yaml
 from hydraulic_plant_node.travel_limits import EndsOfTravel
 
 FORMAT = "hydraulic-bus-1"
@@ -59,7 +60,7 @@ def load_bus(name: str | Path) -> Bus:
     if str(name) in shipped():
         path = SHIPPED / f"{name}.yaml"
     try:
-        document = YAML(typ="rt").load(path.read_text(encoding="utf-8"))
+        document = load_yaml(YAML(typ="rt"), path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise BusFileError(f"{path}: cannot be read ({error}); shipped are {', '.join(shipped())}") from None
     except YAMLError as error:

@@ -22,6 +22,7 @@ from hydraulic_control.errors import ControlError
 from hydraulic_control.parameters import SPECS, check
 from hydraulic_interfaces.contract import CONTROLLER_NODE
 from hydraulic_interfaces.errors import HydraulicError
+from hydraulic_node_utils.yaml_text import load_yaml
 
 FOLDER = Path(__file__).parent / "gains"
 NODE = f"/**/{CONTROLLER_NODE}"
@@ -51,7 +52,7 @@ def load(name_or_path: str | Path) -> dict[str, Any]:
     """
     path = find(name_or_path)
     try:
-        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        document = load_yaml(YAML(typ="safe"), path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, YAMLError) as error:
         raise ControlError(f"{path}: cannot be read: {error}") from None
     sections = document.items() if isinstance(document, dict) else ()

@@ -21,10 +21,11 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.representer import RepresenterError
 
 from hydraulic_node_utils.whole_file import write_text
+from hydraulic_node_utils.yaml_text import load_yaml
 
 from .effect import Parameter, check_value
 from .errors import EffectError, ModelError
@@ -58,10 +59,12 @@ def load_model(source: str | Path) -> Model:
             raise ModelError(f"{source}: no such model file; presets: {', '.join(shipped)}")
         path = shipped[str(source)]
     try:
-        document = _yaml().load(path.read_text(encoding="utf-8"))
+        document = load_yaml(_yaml(), path.read_text(encoding="utf-8"))
     except MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 0
         raise ModelError(f"{path}:{line}: not valid YAML: {error.problem}") from None
+    except YAMLError as error:
+        raise ModelError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
     except UnicodeDecodeError:
         raise ModelError(f"{path}: not a text file in UTF-8") from None
     return _Reader(path, document).model()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from hydraulic_node_utils.yaml_text import load_yaml
 from hydraulic_plant_node.plant_backend import BackendError
 from hydraulic_sim.model import Model
 
@@ -33,7 +34,7 @@ def extra_effects(text: str) -> dict[str, dict[str, float]]:
     :raises BackendError: what is no such mapping.
     """
     try:
-        document = YAML(typ="safe").load(text) if text.strip() else {}
+        document = load_yaml(YAML(typ="safe"), text) if text.strip() else {}
     except YAMLError as error:
         raise BackendError(f"extra_effects is no YAML: {' '.join(str(error).split())}") from None
     if isinstance(document, str):

@@ -15,6 +15,7 @@ from ruamel.yaml.error import YAMLError
 
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 from hydraulic_node_utils.whole_file import write_text
+from hydraulic_node_utils.yaml_text import load_yaml
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.excitation.declared import Declared, number, section, text
 from hydraulic_sysid.excitation.errors import ExcitationError, PlanError
@@ -202,7 +203,7 @@ def load_plan(source: str | Path) -> Plan:
     if not file.is_file():
         file = shipped_plans().get(str(source), file)
     try:
-        content = _yaml().load(file.read_text(encoding="utf-8"))
+        content = load_yaml(_yaml(), file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, YAMLError) as error:
         known = ", ".join(shipped_plans())
         raise ExcitationError(f"{file}: is not a readable plan: {error}; plans by name: {known}") from error

@@ -15,6 +15,7 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from hydraulic_node_utils.whole_file import write_text
+from hydraulic_node_utils.yaml_text import load_yaml
 from hydraulic_sysid.data.bag.types import MessageType
 
 FILE_NAME = "metadata.yaml"
@@ -96,7 +97,7 @@ def to_yaml(content: Any) -> str:
 
 def from_yaml(text: str) -> Any:
     """Content of a YAML text."""
-    return YAML(typ="safe", pure=True).load(text)
+    return load_yaml(YAML(typ="safe", pure=True), text)
 
 
 def write(folder: Path, content: Mapping[str, Any]) -> None:

@@ -89,6 +89,8 @@ def load_column_map(source: str | Path) -> ColumnMap:
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 
+    from hydraulic_node_utils.yaml_text import load_yaml
+
     path = Path(source)
     if not path.is_file():
         shipped = shipped_maps()
@@ -97,7 +99,7 @@ def load_column_map(source: str | Path) -> ColumnMap:
             raise ColumnMapError(f"{source}: no such column map; give a YAML file, or one of {names}")
         path = shipped[str(source)]
     try:
-        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        document = load_yaml(YAML(typ="safe"), path.read_text(encoding="utf-8"))
     except (YAMLError, UnicodeDecodeError) as error:
         raise ColumnMapError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
     return parse_column_map(document, str(path))

@@ -1,4 +1,4 @@
-"""JSON files that a user names."""
+"""JSON files that a user names, and JSON in texts that anybody may send."""
 
 from __future__ import annotations
 
@@ -21,6 +21,15 @@ def read_json(path: Path, error: type[HydraulicError]) -> Any:
         raise error(f"{path}: cannot be read ({problem.strerror})") from problem
     except (ValueError, RecursionError) as problem:
         raise error(f"{path}: not a JSON document ({problem})") from problem
+
+
+def json_object(text: str) -> dict[str, Any]:
+    """The JSON object in a text that came over a topic; empty where it holds none: anybody may publish anything."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 class NewJson:

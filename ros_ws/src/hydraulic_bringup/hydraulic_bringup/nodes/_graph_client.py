@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Callable
@@ -17,6 +16,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from hydraulic_interfaces.contract import PLANT_NODE, RECORDER_NODE, absolute, service
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.json_file import json_object
 from hydraulic_node_utils.nodes.exit_guard import exit_guard
 
 _POLL_S = 0.1
@@ -67,8 +67,9 @@ class GraphClient:
             self._executor.spin_once(timeout_sec=0.1)
 
     def _on_status(self, message: String) -> None:
-        status = json.loads(message.data)
-        self._status[status["output"]] = status
+        status = json_object(message.data)
+        if isinstance(status.get("output"), str):
+            self._status[status["output"]] = status
 
     def recorder_status(self, folder: str) -> dict[str, Any]:
         """What the recorder has said last about a bag; empty before."""

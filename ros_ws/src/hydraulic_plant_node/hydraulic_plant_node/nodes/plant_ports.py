@@ -24,6 +24,7 @@ from hydraulic_interfaces.qos import STREAM_DEPTH, STREAM_HISTORY, profile
 from hydraulic_interfaces.samples import PlantSample
 from hydraulic_node_utils.nodes.mailbox import Mailbox
 from hydraulic_plant_node.command_gate import CommandGate
+from hydraulic_plant_node.recorders import Recorders
 
 
 class PlantPorts:
@@ -37,8 +38,8 @@ class PlantPorts:
         self._description = self._publisher(node, "description")
         self._limits: tuple[bool, bool] | None = None
         self._clock: Any = None
-        self._recorded: dict[str, int] = {}
-        self._recorders: Any = None
+        self._status: Any = None
+        self._recorders = Recorders()
         self._node = node
         self._encode_state = StateEncoder()
         self._encode_pressure = PressureEncoder()
@@ -68,9 +69,9 @@ class PlantPorts:
 
     def recorded_ns(self) -> int | None:
         """Stamp up to which every recorder that records has the samples; None where there is none."""
-        if self._recorders is None or not self._recorders.get_publisher_count():
-            self._recorded = {}
-        return min(self._recorded.values(), default=None)
+        if self._status is None or not self._status.get_publisher_count():
+            self._recorders.forget()
+        return self._recorders.recorded_ns()
 
     def open_state(self) -> None:
         """Become the plant of this namespace: whoever publishes `state` is."""
@@ -79,9 +80,9 @@ class PlantPorts:
 
     def follow_recorders(self) -> None:
         """Hear from now on how far recorders are."""
-        if self._recorders is None:
+        if self._status is None:
             name = f"{RECORDER_NODE}/status"  # of the recorder beside it
-            self._recorders = self._node.create_subscription(String, name, self._on_status, profile("latched"))
+            self._status = self._node.create_subscription(String, name, self._on_status, profile("latched"))
 
     def discard_commands(self) -> None:
         """Forget what came while nobody listened, and what the limit switches last said."""
@@ -117,12 +118,7 @@ class PlantPorts:
             self._clock.publish(self._encode_clock(stamp_ns))
 
     def _on_status(self, message: String) -> None:
-        status = json.loads(message.data)
-        reached_ns = status.get("reached_ns")
-        if status["state"] == "recording" and reached_ns:
-            self._recorded = {**self._recorded, status["output"]: reached_ns}
-        else:
-            self._recorded = {name: at for name, at in self._recorded.items() if name != status["output"]}
+        self._recorders.hear(message.data)
 
     @staticmethod
     def _publisher(node: Node, name: str) -> Any:
