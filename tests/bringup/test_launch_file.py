@@ -179,7 +179,8 @@ def test_a_plant_that_dies_takes_the_others_with_it(
     wait_until(lambda: states, "a state of the plant")
     nodes = {("plant", "/left"), ("controller", "/left"), ("estimator", "/left")}
     wait_until(lambda: set(client.node.get_node_names_and_namespaces()) >= nodes, "all nodes")
-    assert client.state("/left/plant") == client.state("/left/controller") == "active"
+    assert client.state("/left/plant") == "active"
+    wait_until(lambda: client.state("/left/controller") == "active", "an active controller")
     started = dict(re.findall(r"\[(\w+)-\d+\]: process started with pid \[(\d+)\]", process.output()))
     assert set(started) == {"simulator", "controller", "estimator"}
     os.kill(int(started["simulator"]), signal.SIGKILL)
