@@ -1,0 +1,113 @@
+"""The SROS2 policy of a bench on a network: what it allows is what the nodes do, and no more than the contract says."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as Tree
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+
+from hydraulic_control.nodes.controller import ControllerNode
+from hydraulic_control.nodes.reference import ReferenceNode
+from hydraulic_control.nodes.relay import RelayNode
+from hydraulic_interfaces.contract import SERVICES, TOPICS
+from hydraulic_plant_node.nodes.plant_node import PlantNode
+from hydraulic_sim.nodes.simulator import Simulator
+from hydraulic_sysid.nodes.estimator import Estimator
+from hydraulic_sysid.nodes.excitation import ExcitationNode
+from hydraulic_sysid.nodes.recorder import Recorder
+
+POLICY = Path(__file__).parents[2] / "docs" / "security" / "policy.xml"
+SOURCES = {"controller", "excitation", "relay"}
+MADE = {
+    "plant": lambda: PlantNode(Simulator()),
+    "controller": ControllerNode,
+    "reference": ReferenceNode,
+    "relay": RelayNode,
+    "excitation": ExcitationNode,
+    "estimator": Estimator,
+    "recorder": Recorder,
+}
+
+
+def full(name: str, node: str) -> str:
+    if name.startswith("~"):
+        return f"/actuator/{node}{name[1:]}"
+    return name if name.startswith("/") else f"/actuator/{name}"
+
+
+@pytest.fixture(scope="module")
+def policy() -> dict[str, dict[str, set[str]]]:
+    """Node → what ("publish", "subscribe", "reply", "request") → full names."""
+    found: dict[str, dict[str, set[str]]] = {}
+    for enclave in Tree.parse(POLICY).getroot().iter("enclave"):
+        (profile,) = enclave.iter("profile")
+        node = profile.attrib["node"]
+        assert enclave.attrib["path"] == f"{profile.attrib['ns']}/{node}" == f"/actuator/{node}"
+        found[node] = {what: set() for what in ("publish", "subscribe", "reply", "request")}
+        for block in profile:
+            ((what, rule),) = block.attrib.items()
+            assert rule == "ALLOW"
+            found[node][what] |= {full(str(entry.text), node) for entry in block}
+    return found
+
+
+def publishers(policy: dict[str, dict[str, set[str]]], name: str) -> set[str]:
+    return {node for node, allowed in policy.items() if full(name, "") in allowed["publish"]}
+
+
+def test_every_topic_of_the_contract_has_the_publishers_that_it_names(policy: dict[str, Any]) -> None:
+    for row in TOPICS:
+        allowed = publishers(policy, row.name)
+        if row.publisher == "source":
+            assert allowed == SOURCES
+        elif row.publisher != "every node":
+            assert allowed == {row.publisher}, row.name
+
+
+def test_only_the_operator_may_enable_stop_reset_and_set(policy: dict[str, Any]) -> None:
+    for row in SERVICES:
+        name = full(row.name, "")
+        assert {node for node, allowed in policy.items() if name in allowed["request"]} == {"operator"}
+        assert {node for node, allowed in policy.items() if name in allowed["reply"]} == {"plant"}
+    assert all(not allowed["request"] for node, allowed in policy.items() if node != "operator")
+    assert not publishers(policy, "command") & {"operator"}
+
+
+@pytest.mark.parametrize("name", list(MADE))
+def test_a_node_may_do_all_that_it_does(policy: dict[str, Any], name: str, tmp_path: Path) -> None:
+    rclpy.init(args=["--ros-args", "-p", f"output:={tmp_path / 'bag'}"] if name == "recorder" else [])
+    try:
+        node = MADE[name]()
+        does = {
+            "publish": {full(p.topic, name) for p in node.publishers},
+            "subscribe": {full(s.topic, name) for s in node.subscriptions},
+            "reply": {full(s.srv_name, name) for s in node.services},
+            "request": {full(c.srv_name, name) for c in node.clients},
+        }
+        for what, names in does.items():
+            assert names <= policy[name][what], what
+        assert does["publish"] and does["reply"]
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+def test_enforced_without_its_keys_a_node_does_not_start(tmp_path: Path) -> None:
+    """Also where the middleware was built without security: it must not run unprotected instead."""
+    security = {
+        "ROS_SECURITY_ENABLE": "true",
+        "ROS_SECURITY_STRATEGY": "Enforce",
+        "ROS_SECURITY_KEYSTORE": str(tmp_path),
+    }
+    (tmp_path / "enclaves" / "actuator" / "plant").mkdir(parents=True)
+    command = [sys.executable, "-m", "hydraulic_sim.nodes.simulator", "--ros-args", "--enclave", "/actuator/plant"]
+    environment = {**os.environ, **security, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=200.0)
+    assert ended.returncode != 0
+    assert "security" in ended.stderr.lower()
