@@ -117,6 +117,25 @@ def test_parameter_files_fit_their_nodes(plant: str) -> None:
         assert type(value) is type(specs[name].default), name
 
 
+def test_parameter_files_apply_in_every_namespace(ros_domain: int) -> None:
+    rclpy = pytest.importorskip("rclpy")
+    from hydraulic_control import gains_file
+    from hydraulic_node_utils.nodes.rclpy_internals import given_at_start
+
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    for namespace in ("/actuator", "/left", "/hall_2/left"):
+        for name, file, parameter in (
+            ("plant", BRINGUP / "config/bench.yaml", "position_noise"),
+            ("plant", BRINGUP / "config/can.yaml", "watchdog"),
+            ("controller", gains_file.find("npid"), "kp"),
+        ):
+            options = ["--ros-args", "--params-file", str(file)]
+            node = rclpy.create_node(name, namespace=namespace, context=context, cli_args=options)
+            assert parameter in given_at_start(node), f"{namespace}/{name}: {file.name}"
+    rclpy.shutdown(context=context)
+
+
 def test_what_it_imports_is_declared() -> None:
     tree = ast.parse(FILE.read_text(encoding="utf-8"))
     manifest = (BRINGUP / "package.xml").read_text(encoding="utf-8")
