@@ -93,6 +93,7 @@ class Process:
 
 LONGEST = (
     "hidden_effects/test_diagnosis.py",
+    "hidden_effects/test_proposed_effect.py",
     "system/test_demo.py",
     "system/test_demo_can.py",
     "system/test_paper.py",

@@ -10,7 +10,7 @@ from pathlib import Path
 from . import base, slots
 from .effect import Parameter, arguments, check_value
 from .errors import EffectError, ModelError
-from .registry import Library, library
+from .registry import Library, check_file, library
 
 KINDS = ("hydraulic", "mechanical")
 
@@ -147,6 +147,22 @@ class Model:
         changed = replace(self, effects=effects).with_values({f"{name}.{k}": v for k, v in (values or {}).items()})
         changed.check_laws()
         return changed
+
+    def with_effect_file(self, file: Path) -> Model:
+        """A copy that has the effect of a file of the user's own in its library; it is off until `with_effect`.
+
+        :raises EffectError: the file is unusable, or its name is taken.
+        """
+        file = file.expanduser().resolve()
+        check_file(file)
+        changed = self if file in self.user_effects else replace(self, user_effects=(*self.user_effects, file))
+        assert changed.library
+        return changed
+
+    def with_moved_file(self, old: Path, new: Path) -> Model:
+        """A copy that names an effect file at another place."""
+        files = tuple(new.resolve() if file == old.resolve() else file for file in self.user_effects)
+        return replace(self, user_effects=files)
 
     def without_effect(self, name: str) -> Model:
         """A copy with an effect off; what it said of the effect's parameters is kept out too."""

@@ -101,12 +101,33 @@ FAULT = {
 SPIKES = {"channel": "pressure_a", "count": 3, "share": 1e-3, "places": [{"record": "steps", "time": 1.5}]}
 RECORDING = {"recording": {"faults": [FAULT], "spikes": [SPIKES], "mains_lines": {"pressure_a": [50.0]}}}
 OUTSIDE = {"nonparametric_curves": [CURVE], "nearest_effects": ["backlash"]}
+PROPOSED = {
+    "proposed_effect": {
+        "name": "own",
+        "file": "/tmp/own effect.py",
+        "place": "unknown_force",
+        "subsystem": "force",
+        "variable": "position",
+        "law": "kink",
+        "explained_share": 0.98,
+        "beside": ["stribeck_friction"],
+    }
+}
 
 
 @pytest.mark.parametrize(
     ("kind", "change", "words"),
     [
-        ("outside the library", OUTSIDE, "The shape of what is left; 40.0\u00a0%; library: backlash; Write an effect"),
+        (
+            "outside the library",
+            OUTSIDE,
+            "The shape of what is left; 40.0\u00a0%; library: backlash; --propose my_effect.py",
+        ),
+        (
+            "outside the library",
+            OUTSIDE | PROPOSED,
+            "Add stribeck_friction to the model first; add &#39;/tmp/own effect.py&#39;",
+        ),
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
         ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
         ("complete", {"check": [CONTRADICTION]}, "First: The travel is too long. Mend the stroke."),
@@ -162,6 +183,37 @@ def test_apply_writes_what_the_verdict_says(
     assert diagnose_main(command) == (0 if "model.yaml" in written else 1)
     assert sorted(f.name for f in tmp_path.glob("*.yaml")) == written
     assert ("no model.yaml was written" in capsys.readouterr().err) == ("model.yaml" not in written)
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("there.py", "never overwritten"),
+        ("coulomb_friction.py", "has an effect coulomb_friction already"),
+        ("no-name.py", "allowed is NAME.py"),
+        ("class.py", "allowed is NAME.py"),
+        ("effect.txt", "allowed is NAME.py"),
+    ],
+)
+def test_where_no_effect_can_be_proposed_is_said_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, complaint: str
+) -> None:
+    (tmp_path / "there.py").write_text("mine")
+    command = ["--model", "sample_bench", "--record", str(RECORDS), "--out", str(tmp_path / "out")]
+    assert diagnose_main([*command, "--propose", str(tmp_path / name)]) == 2
+    assert complaint in capsys.readouterr().err
+    assert (tmp_path / "there.py").read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_nothing_is_proposed_where_the_library_explains_the_records(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = Diagnosis(load_model(run / "model.yaml"), {}, json.loads((run / "diagnose.json").read_text()))
+    monkeypatch.setattr("hydraulic_sysid.verbs.diagnose.diagnose", lambda *_: found)
+    command = ["--model", "sample_bench", "--record", str(RECORDS), "--out", str(tmp_path / "out")]
+    assert diagnose_main([*command, "--propose", str(tmp_path / "own.py")]) == 0
+    assert "own.py was not written: the verdict is 'missing'" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
 def test_nothing_but_what_was_found_has_changed_in_the_model(run: Path) -> None:

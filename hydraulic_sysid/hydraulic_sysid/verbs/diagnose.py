@@ -4,16 +4,22 @@ Fits what the model calls free, tries every effect of the library that is off, a
 data cannot tell apart, that nothing is missing, or what shape it has that no effect explains. What counts must lower
 the error on data that no fit has seen. Writes diagnose.json and a page (report.html); with --apply also model.yaml,
 the model that the verdict names, and nothing where it names none; for a verdict with several names each competing model
-(competing_EFFECT.yaml).
+(competing_EFFECT.yaml). Where the cause lies outside the library, --propose writes what is left as an effect file.
 """
 
 from __future__ import annotations
 
 import argparse
+import keyword
+from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
-from hydraulic_sim.model_file import load_model, save_model
+from hydraulic_node_utils import cli
+from hydraulic_node_utils.whole_file import write_text
+from hydraulic_sim.model_file import Model, load_model, save_model
 from hydraulic_sysid.diagnosis.calibrate import FitSettings
+from hydraulic_sysid.diagnosis.proposed_effect import propose
 from hydraulic_sysid.diagnosis.search import diagnose
 from hydraulic_sysid.verbs import _diagnosis_table
 from hydraulic_sysid.verbs import _options as opt
@@ -22,6 +28,7 @@ EPILOG = """\
 examples:
   python -m hydraulic_sysid diagnose --model sample_bench --record examples/sample_bench --out runs/diagnosed
   python -m hydraulic_sysid diagnose --model my.yaml --record a.csv b.csv --holdout c.csv --apply --out runs/mine
+  python -m hydraulic_sysid diagnose --model my.yaml --record a.csv b.csv --propose my_effect.py --out runs/mine
 
 exit codes: 0 nothing is missing, or what is missing or wrong was found and named; 1 something is left that was not
 named (outside the library, or effects that these data cannot tell apart); 2 unusable input
@@ -33,12 +40,20 @@ def main(argv: list[str] | None = None) -> int:
     parser = opt.parser("diagnose", __doc__, EPILOG)
     opt.add_diagnosis_options(parser)
     parser.add_argument("--apply", action="store_true", help=f"write the model that the verdict names ({opt.MODEL})")
+    parser.add_argument(
+        "--propose",
+        metavar="FILE.py",
+        type=Path,
+        help="where the cause lies outside the library: write what is left as an effect file, which add joins",
+    )
     return opt.run(parser, _diagnose, _diagnosis_table.show, argv, bulky=("worst_segments",))
 
 
 def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     opt.check_new(options.out, *((opt.MODEL,) if options.apply else ()), "competing_*.yaml")
     model = load_model(options.model)
+    if options.propose:
+        _check_name(options.propose, model)
     records = opt.read_records(options)
     validation = opt.read_kept_back(options.holdout, options)
     done = diagnose(model, records, validation, FitSettings(length=options.segment), say)
@@ -52,4 +67,32 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
         notes.append(
             f"no {opt.MODEL} was written: the verdict is {kind!r}, which says of no model that it is right{instead}"
         )
-    return opt.Done(done.result, {name: partial(save_model, one) for name, one in models.items()}, done.decided, notes)
+    result = done.result
+    files: dict[str, Callable[[Path], object]] = {name: partial(save_model, one) for name, one in models.items()}
+    if options.propose:
+        file: Path = options.propose.absolute()
+        effect = propose(done.remaining, file.stem, [r.name for r in records], say) if done.remaining else None
+        if effect is None:
+            why = (
+                "no curve explains anything" if done.remaining else f"the verdict is {kind!r}, not outside the library"
+            )
+            notes.append(f"{file.name} was not written: {why}")
+        else:
+            files[str(file)] = partial(write_text, content=effect.text, overwrite=False)
+            result = {**result, "proposed_effect": effect.row | {"file": str(file)}}
+    return opt.Done(result, files, done.decided, notes)
+
+
+def _check_name(file: Path, model: Model) -> None:
+    """Find out before the work that an effect can be written there.
+
+    :raises UsageError: it cannot.
+    """
+    if file.suffix != ".py" or not file.stem.isidentifier() or keyword.iskeyword(file.stem):
+        raise cli.UsageError(
+            f"--propose {file}: an effect is named after its file; allowed is NAME.py, NAME an identifier"
+        )
+    if file.stem in model.library:
+        raise cli.UsageError(f"--propose {file}: the library has an effect {file.stem} already; choose another name")
+    if file.exists():
+        raise cli.UsageError(f"--propose {file}: it exists; an effect file is never overwritten")

@@ -19,10 +19,33 @@ from hydraulic_sysid.estimation.fit import FitSettings
 from . import verdict as verdicts
 from .data_sheet import Deviation, as_filed
 from .document import document, with_balances
+from .linearisation import Linearisation
 from .misfit import explained
-from .nonparametric_curves import nonparametric_curves
+from .nonparametric_curves import NonparametricCurve, nonparametric_curves
 from .search import HOPELESS, Search, SearchResult
 from .uncertainty import Known, parameter_errors
+
+SAMPLED = 60  # segments that are kept of what is left
+
+
+@dataclass(frozen=True)
+class Remaining:
+    """What no effect of the library explains: a sample of the fitted model's segments, and the curves of what is left.
+
+    ``beside``: effects that were added to this model.
+    """
+
+    at: Linearisation
+    curves: Sequence[NonparametricCurve]
+    beside: Sequence[str] = ()
+
+    @classmethod
+    def of(
+        cls, at: Linearisation, curves: Sequence[NonparametricCurve] | None = None, beside: Sequence[str] = ()
+    ) -> Remaining:
+        """What is left at a fitted model."""
+        found = nonparametric_curves(at, lambda _: None) if curves is None else curves
+        return cls(at.sample(SAMPLED)[0], found, beside)
 
 
 @dataclass(frozen=True)
@@ -30,12 +53,13 @@ class Diagnosis:
     """What came out. ``model``: where the search ended, fitted, its errors known and its history continued.
 
     ``competing``: models between which the data do not decide, by the effects that only they have, none where they do;
-    ``result``: the document (docs/report-json.md).
+    ``result``: the document (docs/report-json.md); ``remaining``: of the verdict "outside the library".
     """
 
     model: Model
     competing: dict[str, Model]
     result: dict[str, Any]
+    remaining: Remaining | None = None
 
     @property
     def decided(self) -> bool:
@@ -70,6 +94,8 @@ def diagnose(
     proxy = explained(found.base.misfit, found.final.misfit) < HOPELESS
     suspect = found.base if proxy else found.final
     curves = nonparametric_curves(suspect.linearisation, say) if outside else []
+    beside = () if suspect is found.base else tuple(found.added)
+    remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
     known = parameter_errors(found.final.linearisation)
     found = replace(found, moved=[with_error(d, known) for d in found.moved])
     whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
@@ -83,7 +109,7 @@ def diagnose(
     say("balances")
     rows, where = _balances(before, records, before is suspected)
     rows_after, where_after = _balances(after, records, after is suspected) if after else ([], [])
-    return Diagnosis(done, competing, with_balances(whole, rows, rows_after, where or where_after))
+    return Diagnosis(done, competing, with_balances(whole, rows, rows_after, where or where_after), remaining)
 
 
 def with_error(deviation: Deviation, known: Mapping[str, Known]) -> Deviation:

@@ -137,6 +137,7 @@ def document(
         "unexplained_share": unexplained(result.base.misfit, result.final.misfit),
         "nonparametric_curves": [_curve(c) for c in curves],
         "nearest_effects": [r.name for r in final.refits[:_NEAREST]] if outside else [],
+        "proposed_effect": None,
         "balances": [],
         "worst_segments": worst_segments(result),
     }
@@ -154,7 +155,7 @@ def added_document(result: SearchResult, known: Mapping[str, Known], confirmed: 
         "level": whole["verdict"]["level"] if confirmed else "off",
         "text": text + ("." if confirmed else ": no more than chance or fitting gives; the data do not bear it out."),
     }
-    unused = ("competing_models", "nonparametric_curves", "nearest_effects", "balances")
+    unused = ("competing_models", "nonparametric_curves", "nearest_effects", "proposed_effect", "balances")
     return {k: v for k, v in whole.items() if k not in unused}
 
 

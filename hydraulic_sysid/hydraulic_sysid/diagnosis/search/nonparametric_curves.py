@@ -8,15 +8,16 @@ model and nothing is differentiated.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sim.effect import Effect
+from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.plant import Plant
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 
 from .candidates import subsystem
 from .linearisation import Linearisation
@@ -49,12 +50,37 @@ class NonparametricCurve:
     error: Array
 
 
+@dataclass(frozen=True)
+class Place:
+    """A place of the plant where something may be added, as ``effect`` adds a hat function, and a variable there.
+
+    ``number``: the variable's among those of the effect; ``values``: what it takes in the records.
+    """
+
+    plant: Plant
+    effect: Effect
+    number: int
+    variable: str
+    values: Array
+
+    @property
+    def height(self) -> Parameter:
+        """Of a hat function."""
+        return next(p for p in self.effect.parameters if p.name == "height")
+
+
 def nonparametric_curves(at: Linearisation, say: Callable[[str], None]) -> list[NonparametricCurve]:
     """All curves, the one that explains most first. Empty for a plant that takes none of them."""
     part, _ = at.sample(ENOUGH)
-    model = replace(part.model, user_effects=(*part.model.user_effects, *FILES))
-    seen = _seen(part)
-    found: list[NonparametricCurve] = []
+    found = (_curve(part, place) for place in places(part, say))
+    return sorted((c for c in found if c is not None), key=lambda c: -c.reduction)
+
+
+def places(at: Linearisation, say: Callable[[str], None]) -> Iterator[Place]:
+    """Those that the plant has, with every variable that the records show and that moves."""
+    more = [f for f in FILES if f not in at.model.user_effects]
+    model = replace(at.model, user_effects=(*at.model.user_effects, *more))
+    seen = _seen(at)
     for file in FILES:
         try:
             extended = model.with_effect(file.stem)
@@ -66,9 +92,34 @@ def nonparametric_curves(at: Linearisation, say: Callable[[str], None]) -> list[
         say(f"curve of {effect.summary}")
         for number, variable in enumerate(effect.kernel.__globals__["VARIABLES"]):
             if variable in seen:
-                curve = _curve(part, plant, effect, number, variable, seen[variable])
-                found += [curve] if curve is not None else []
-    return sorted(found, key=lambda c: -c.reduction)
+                yield Place(plant, effect, number, variable, seen[variable])
+
+
+def curve_normal(at: Linearisation, place: Place, knots: Array) -> NormalEquations | None:
+    """Of the heights (K,) of hat functions at equally spaced ``knots`` (K,), over those of the height's default.
+
+    The free parameters are eliminated. None where the plant does not run.
+    """
+    name, width = place.effect.name, float(knots[1] - knots[0])
+    hats = [
+        {"over": float(place.number), "centre": float(z), "width": width, "height": place.height.default} for z in knots
+    ]
+    try:
+        changed = at.changes(
+            [
+                place.plant.with_parameters({f"{name}.{k}": v for k, v in hat.items()})
+                for hat in ({"height": 0.0}, *hats)
+            ]
+        )
+    except SimulationError:
+        return None
+    return at.bordered([c[..., 1:] - c[..., :1] for c in changed]).marginal(len(at.parameters))
+
+
+def unexplained(at: Linearisation) -> float:
+    """The sum of squares that noise does not explain."""
+    noise = sum(float(r.size) - s.free.size * len(s) for r, s in zip(at.residual, at.split.segments, strict=True))
+    return sum(float(c.sum()) for c in at.costs) - noise
 
 
 def _seen(at: Linearisation) -> dict[str, Array]:
@@ -94,26 +145,14 @@ def _seen(at: Linearisation) -> dict[str, Array]:
     return values
 
 
-def _curve(
-    at: Linearisation, plant: Plant, effect: Effect, number: int, variable: str, values: Array
-) -> NonparametricCurve | None:
-    low, high = (float(np.quantile(values, q)) for q in _RANGE)
+def _curve(at: Linearisation, place: Place) -> NonparametricCurve | None:
+    low, high = (float(np.quantile(place.values, q)) for q in _RANGE)
     if not high - low > 1e-9 * max(abs(low), abs(high), 1e-12):
         return None
     knots: Array = np.linspace(low, high, KNOTS, dtype=np.float64)
-    height = next(p for p in effect.parameters if p.name == "height")
-    hats = [
-        {"over": float(number), "centre": float(z), "width": float(knots[1] - knots[0]), "height": height.default}
-        for z in knots
-    ]
-    every = [{"height": 0.0}, *hats]
-    try:
-        changed = at.changes(
-            [plant.with_parameters({f"{effect.name}.{k}": v for k, v in hat.items()}) for hat in every]
-        )
-    except SimulationError:
+    normal = curve_normal(at, place, knots)
+    if normal is None:
         return None
-    normal = at.bordered([c[..., 1:] - c[..., :1] for c in changed]).marginal(len(at.parameters))
     visited = np.diag(normal.information)
     ridge = _RIDGE * float(visited.max())
     if not ridge > 0.0:
@@ -122,19 +161,19 @@ def _curve(
     value = -inverse @ normal.gradient
     reduction = normal.reduction(value)
     total = sum(float(c.sum()) for c in at.costs)
-    noise = sum(float(r.size) - s.free.size * len(s) for r, s in zip(at.residual, at.split.segments, strict=True))
     spread = max(1.0, np.sqrt(total / sum(r.size for r in at.residual)))
     error = np.sqrt(np.maximum(np.diag(inverse), 0.0)) * spread
     shown = visited > _VISITED * float(visited.max())
+    size = place.height.default
     return NonparametricCurve(
-        effect.name,
-        subsystem(effect),
-        effect.summary,
-        variable,
-        height.unit,
+        place.effect.name,
+        subsystem(place.effect),
+        place.effect.summary,
+        place.variable,
+        place.height.unit,
         reduction,
-        min(reduction / max(total - noise, 1e-300), 1.0),
+        min(reduction / max(unexplained(at), 1e-300), 1.0),
         knots[shown],
-        value[shown] * height.default,
-        _WIDTH * error[shown] * height.default,
+        value[shown] * size,
+        _WIDTH * error[shown] * size,
     )

@@ -445,7 +445,10 @@ class Search:
         scores = score(at, [self.given.library[name]], record_features(at))
         if not scores:
             raise DiagnosisError(f"{name} changes nothing in these records: they do not excite it")
-        tried = self.refit(base, scores[0])
+        starts = [scores[0].start]
+        if not self.given.library.is_builtin(name):  # a file of the user's own may have been made for these records
+            starts.append({f"{name}.{p.name}": p.default for p in self.given.library[name].parameters})
+        tried = min((self.refit(base, replace(scores[0], start=s)) for s in starts), key=lambda r: r.misfit.total)
         self.say(f"fitting with {name}")
         # What the model without it left was no sure guide to noise and delays.
         final = self.judged(self.state(tried.refit.model))

@@ -1,4 +1,9 @@
-"""What the unknown additions have in common: a hat function of some height at one place of one variable."""
+"""What the unknown additions have in common: a hat function of some height at one place of one variable.
+
+Beside its ``EFFECT`` each file names the ``VARIABLES``, and in ``RETURNS`` what a kernel returns that has any other
+``law`` in the place of the hat function (by variable, where that makes a difference); ``EXPRESSIONS`` has the variables
+that go by another name there than elsewhere.
+"""
 
 from __future__ import annotations
 

@@ -6,6 +6,7 @@ C = height*hat(z)
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("mean_pressure", "position", "time")
+RETURNS = "law, law"
 
 
 def add(pressure_a, pressure_b, position, t, over, centre, width, height):

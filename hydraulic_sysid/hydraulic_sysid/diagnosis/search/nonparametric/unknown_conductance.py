@@ -6,6 +6,7 @@ q = height*hat(z)*(p_A - p_B), q_A = -q, q_B = q
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("position", "time", "speed", "size_of_pressure_difference")
+RETURNS = "-law * pressure_difference, law * pressure_difference"
 
 
 def add(position, t, velocity, pressure_difference, over, centre, width, height):

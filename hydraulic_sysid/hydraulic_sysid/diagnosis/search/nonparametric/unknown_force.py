@@ -6,6 +6,7 @@ F = -height*hat(z)
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("velocity", "position", "pressure_difference", "mean_pressure", "opening", "time")
+RETURNS = "-law"
 
 
 def add(velocity, position, pressure_difference, pressure_a, pressure_b, opening, t, over, centre, width, height):

@@ -8,6 +8,7 @@ Against the motion, at rest as at speed.
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("position", "speed", "size_of_pressure_difference", "mean_pressure", "time")
+RETURNS = "-law * direction"
 
 
 def add(position, velocity, pressure_difference, pressure_a, pressure_b, t, direction, over, centre, width, height):

@@ -6,6 +6,7 @@ o = s*(1 + height*hat(z))
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("position", "time", "pressure_difference", "velocity")
+RETURNS = "opening * (1.0 + law)"
 
 
 def add(position, t, pressure_difference, velocity, opening, over, centre, width, height):

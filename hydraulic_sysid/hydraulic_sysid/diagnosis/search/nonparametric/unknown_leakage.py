@@ -6,6 +6,7 @@ q_A = -height*hat(z), q_B = height*hat(z)
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("pressure_difference", "position", "velocity", "opening", "time")
+RETURNS = "-law, law"
 
 
 def add(pressure_difference, position, velocity, opening, t, over, centre, width, height):

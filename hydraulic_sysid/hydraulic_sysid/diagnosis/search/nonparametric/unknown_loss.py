@@ -6,6 +6,7 @@ q_A = q_B = -height*hat(z)
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("mean_pressure", "position", "velocity", "opening", "time")
+RETURNS = "-law, -law"
 
 
 def add(pressure_a, pressure_b, position, velocity, opening, t, over, centre, width, height):

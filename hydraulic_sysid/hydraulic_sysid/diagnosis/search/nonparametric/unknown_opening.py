@@ -6,6 +6,7 @@ o = s + height*hat(z)
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("opening", "velocity", "pressure_difference", "position", "time")
+RETURNS = "opening + law"
 
 
 def add(opening, velocity, pressure_difference, position, t, over, centre, width, height):

@@ -8,6 +8,12 @@ Of either one over its own reading, or of both over time.
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("pressure_a", "pressure_b", "time")
+RETURNS = {
+    "pressure_a": "reading_a + law, reading_b",
+    "pressure_b": "reading_a, reading_b + law",
+    "time": "reading_a + law, reading_b + law",
+}
+EXPRESSIONS = {"pressure_a": "reading_a", "pressure_b": "reading_b"}
 
 
 def add(reading_a, reading_b, t, over, centre, width, height):

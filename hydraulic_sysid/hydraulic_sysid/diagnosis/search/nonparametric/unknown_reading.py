@@ -6,6 +6,7 @@ y = x + height*hat(z)
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("position", "velocity", "time", "pressure_difference")
+RETURNS = "reading + law"
 
 
 def add(position, velocity, t, pressure_difference, reading, over, centre, width, height):

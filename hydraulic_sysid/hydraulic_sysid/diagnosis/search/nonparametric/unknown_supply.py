@@ -6,6 +6,7 @@ p_S = p_0 + height*hat(z)
 from hydraulic_sysid.diagnosis.search.nonparametric.hat_function import effect
 
 VARIABLES = ("size_of_opening", "velocity", "time", "pressure_difference")
+RETURNS = "law"
 
 
 def add(opening, velocity, t, pressure_difference, over, centre, width, height):

@@ -1,0 +1,163 @@
+"""An effect that no library has, written as a file: its law, its text, and what may not happen to files."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hydraulic_sim.registry import Library, library, load_effect
+from hydraulic_sysid.diagnosis.proposed_effect.effect_file import VARIABLE_UNITS, effect_text, per
+from hydraulic_sysid.diagnosis.proposed_effect.laws import (
+    FINE,
+    PERIODIC,
+    SHORT,
+    CurveEquations,
+    FittedLaw,
+    best_law,
+    spline,
+)
+from hydraulic_sysid.diagnosis.search.nonparametric import FILES
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
+
+SIGNALS = {
+    "position": 0.13, "velocity": -0.07, "pressure_a": 6e6, "pressure_b": 4.5e6, "pressure_difference": 1.5e6,
+    "opening": 0.3, "t": 4.0, "direction": -1.0, "reading": 0.131, "reading_a": 6.01e6, "reading_b": 4.52e6,
+}  # fmt: skip
+PLACES = [
+    (file, number, variable)
+    for file in FILES
+    for number, variable in enumerate(load_effect(file).effect.kernel.__globals__["VARIABLES"])
+]
+
+
+def call(kernel, **parameters):
+    return kernel(**{name: (SIGNALS | parameters)[name] for name in inspect.signature(kernel).parameters})
+
+
+@pytest.mark.parametrize(("file", "number", "variable"), PLACES, ids=lambda x: getattr(x, "stem", str(x)))
+def test_a_file_does_at_its_place_what_the_curve_did(file: Path, number: int, variable: str, tmp_path: Path) -> None:
+    hat = load_effect(file).effect
+    names = {"time": "t", "mean_pressure": "pressure_a", "size_of_opening": "opening"}
+    z = SIGNALS.get(names.get(variable, variable.removeprefix("size_of_")), 0.07)
+    knots = np.linspace(z - 3.3 * abs(z), z + 3.7 * abs(z), 17)
+    step, height = float(knots[1] - knots[0]), 0.37 * hat.parameters[0].default
+    for middle in (7, 8):
+        heights = np.zeros(17)
+        heights[middle] = height
+        own = FittedLaw(spline(17), heights, (), 1.0, -1.0, knots)
+        text = effect_text(hat, variable, own, (float(knots[0]), float(knots[-1])), "Evidence.", ["a"])
+        path = tmp_path / f"written_{middle}.py"
+        path.write_text(text)
+        written = load_effect(path).effect
+        defaults = {p.name: p.default for p in written.parameters}
+        centre = float(knots[middle])
+        expected = call(hat.kernel, over=float(number), centre=centre, width=step, height=height)
+        assert call(written.kernel, **defaults) == pytest.approx(expected, rel=1e-3), text
+        assert set(VARIABLE_UNITS) >= {variable}
+        assert max(map(len, text.splitlines())) <= 120
+    assert Library([*(library().file(n) for n in library()), load_effect(path)])  # slot, signals and names are in order
+
+
+def curve_equations(true: np.ndarray, knots: np.ndarray, weight: float = 1e6) -> CurveEquations:
+    """Of a curve seen through noise: its sum of squares is least at the true one, and neighbours go together."""
+    size = float(np.abs(true).max())
+    near = np.exp(-np.abs(np.subtract.outer(np.arange(len(knots)), np.arange(len(knots)))) / 0.7)
+    information = weight / size**2 / len(knots) * near
+    noise = np.linalg.cholesky(information) @ np.random.default_rng(5).standard_normal(len(knots))
+    normal = NormalEquations(information, ((noise - information @ true)[None],))
+    return CurveEquations(normal, knots, (float(knots[0]), float(knots[-1])), 0.0, 50_000)
+
+
+TRUE = {
+    "kink": (lambda z: 2e4 * np.maximum(z - 0.1, 0.0), (-0.3, 0.4)),
+    "dead zone": (lambda z: np.sign(z) * np.maximum(np.abs(z) - 0.12, 0.0), (-0.3, 0.4)),
+    "bump": (lambda z: -3.0 * np.exp(-(((z + 0.1) / 0.08) ** 2)), (-0.3, 0.4)),
+    "square law": (lambda z: 5e3 * z * np.abs(z), (-0.3, 0.4)),
+    "approach": (lambda z: 2.0 * (1.0 - np.exp(-z / 4.0)), (0.0, 20.0)),
+    "spline": (lambda z: np.where(z < 0.0, np.cos(9.0 * z), 1.0 - 4.0 * z), (-0.3, 0.4)),
+}
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_a_short_law_is_taken_where_it_explains_as_much_as_a_spline(name: str) -> None:
+    true, extent = TRUE[name]
+    knots = np.linspace(*extent, FINE)
+    found = best_law(curve_equations(true(knots), knots))
+    assert found is not None and found.law.name == name, found
+    # Sixteen intervals are as fine as a spline is made.
+    assert np.allclose(found.values(knots), true(knots), atol=0.05 * np.abs(true(knots)).max())
+
+
+def test_what_goes_round_is_periodic() -> None:
+    knots = np.linspace(-0.6, 0.6, PERIODIC)
+    true = 400.0 * np.sin(2.0 * np.pi * knots / 0.03 + 0.4)
+    found = best_law(curve_equations(true, knots))
+    assert found is not None and found.law.name == "periodic" and len(found.coefficients) == 2
+    assert found.shape[0] == pytest.approx(0.03, rel=1e-3)
+
+
+def test_no_law_explains_noise() -> None:
+    knots = np.linspace(-0.3, 0.4, FINE)
+    assert best_law(curve_equations(1e-9 * np.ones(FINE), knots, weight=1.0)) is None
+
+
+@pytest.mark.parametrize("law", [*SHORT, spline(5)], ids=lambda law: f"{law.name} {len(law.coefficients)}")
+def test_the_text_of_a_law_is_its_basis(law, tmp_path: Path) -> None:
+    hat = load_effect(next(f for f in FILES if f.stem == "unknown_force")).effect
+    coefficients = np.linspace(1.0, 2.0, len(law.coefficients))
+    shape = tuple(0.3 + 0.1 * i for i in range(len(law.shapes)))
+    knots = np.linspace(-1.0, 1.0, 5) if law.name == "spline" else None
+    fitted = FittedLaw(law, coefficients, shape, 1.0, -1.0, knots)
+    path = tmp_path / "written.py"
+    path.write_text(effect_text(hat, "position", fitted, (-1.0, 1.0), "Evidence.", ["a"]))
+    written = load_effect(path).effect
+    defaults = {p.name: p.default for p in written.parameters}
+    for z in (-0.9, -0.35, 0.0, 0.2, 0.77):
+        (value,) = fitted.values(np.array([z]))
+        assert written.kernel(
+            z, *(defaults[n] for n in inspect.signature(written.kernel).parameters if n in defaults)
+        ) == (pytest.approx(-value, rel=1e-3, abs=1e-12))
+    assert all(math.isfinite(b) for p in written.parameters for b in p.bounds)
+
+
+@pytest.mark.parametrize(
+    ("unit", "other", "power", "expected"),
+    [
+        ("N", "m", 1, "N/m"),
+        ("N", "m/s", 2, "N*s^2/m^2"),
+        ("m^3/(s*Pa)", "m", 0, "m^3/(s*Pa)"),
+        ("m^3/Pa", "Pa", 1, "m^3/Pa^2"),
+        ("m", "m", 1, "1"),
+        ("1", "Pa", 1, "1/Pa"),
+        ("N", "1", 3, "N"),
+    ],
+)
+def test_the_unit_of_a_coefficient(unit: str, other: str, power: int, expected: str) -> None:
+    assert per(unit, other, power) == expected
+
+
+def test_a_spline_is_constant_where_the_variable_seldom_is() -> None:
+    knots = np.linspace(-1.0, 1.0, FINE)
+    true = np.where(np.abs(knots) < 0.5, np.cos(9.0 * knots), np.sign(knots) * 40.0)
+    every = curve_equations(true, knots)
+    weight = np.where(np.abs(knots) < 0.5, 1.0, 1e-4)
+    information = every.normal.information * np.outer(weight, weight)
+    seldom = NormalEquations(information, (-(information @ true)[None],))
+    found = best_law(replace(every, normal=seldom, usual=(-0.5, 0.5)), short=False)
+    assert found is not None and found.knots is not None and np.abs(found.knots).max() == 0.5
+    assert np.abs(found.values(np.array([-1.0, 1.0]))).max() < 2.0
+
+
+def test_the_name_of_a_record_runs_nothing(tmp_path: Path) -> None:
+    hat = load_effect(FILES[0]).effect
+    variable = hat.kernel.__globals__["VARIABLES"][0]
+    fitted = FittedLaw(spline(3), np.ones(3), (), 1.0, -1.0, np.array([0.0, 1.0, 2.0]))
+    hostile = ['"""\nraise SystemExit\n"""', "a\\", 'b"; import os #', "{0}", "\x00\r\n"]
+    path = tmp_path / "written.py"
+    path.write_text(effect_text(hat, variable, fitted, (0.0, 2.0), "Evidence.", hostile))
+    assert "import os" in load_effect(path).effect.source
