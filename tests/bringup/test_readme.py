@@ -7,6 +7,7 @@ import importlib
 import re
 import shlex
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,14 @@ from hydraulic_bringup import launched
 from hydraulic_bringup.entry.cli import verb_names
 from hydraulic_interfaces import contract
 from hydraulic_interfaces.conversions import interface_class
+from hydraulic_node_utils.nodes import middleware
 from hydraulic_sysid.data.records import load_column_map, parse_column_map, read_records, shipped_maps
 from hydraulic_sysid.excitation import load_plan
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "examples").rglob("*.md"))]
+SECURITY = {"ROS_SECURITY_KEYSTORE", "ROS_SECURITY_ENABLE", "ROS_SECURITY_STRATEGY"}
 PACKAGES = sorted(path.name for path in (ROOT / "ros_ws" / "src").iterdir())
 
 
@@ -99,6 +102,8 @@ def check_node(module: str, arguments: list[str]) -> None:
         declared |= {spec.name: spec for spec in common}
     own, _, ros = " ".join(arguments).partition("--ros-args")
     assert set(own.split()) <= ({"--autostart"} if hasattr(loaded, "run_plant") else set())
+    for enclave in re.findall(r"--enclave (\S+)", ros):
+        assert f'<enclave path="{enclave}">' in (ROOT / "docs/security/policy.xml").read_text(encoding="utf-8")
     pairs = re.findall(r"-p (\w+):=(\S+)", ros)
     assert len(pairs) == ros.count("-p ")
     for name, value in pairs:
@@ -131,6 +136,18 @@ def check_command(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
         assert kind == topic.type
         assert set(yaml.safe_load(message)) <= set(interface_class(kind).get_fields_and_field_types())
         return
+    if words[:2] == ["ros2", "security"]:
+        assert words[2] in ("create_keystore", "generate_artifacts")
+        assert all((ROOT / file).is_file() for option, file in pairwise(words) if option == "-p")
+        return
+    if words[:2] == ["ros2", "run"]:
+        check_node(module_of(*words[2:4]), words[4:])
+        return
+    if words[0] == "export":
+        given = dict(word.split("=") for word in words[1:])
+        assert set(given) <= {middleware.RANGE, *SECURITY}
+        assert given.get(middleware.RANGE, "SUBNET") in ("SUBNET", "LOCALHOST", "SYSTEM_DEFAULT", "OFF")
+        return
     assert words[0] == "./bench", words
     verb, *rest = words[1:]
     assert verb in verb_names()
@@ -158,6 +175,9 @@ def check_command(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
         "./bench run hydraulic_sysid excitation --ros-args -p plan:=waltz",
         "./bench run hydraulic_sysid compare --record nowhere.csv --model sample_bench --out runs/x",
         "./bench run hydraulic_sysid compare --fast",
+        "ros2 security generate_artifacts -k keys -p nowhere.xml",
+        "ros2 run hydraulic_sim simulator --ros-args --enclave /nobody",
+        "export ROS_SECURITY_ENABLED=true",
         "./bench shell -c 'ros2 launch hydraulic_bringup bench.launch.py speed:=2'",
         "python -m hydraulic_sysid guess",
     ],
