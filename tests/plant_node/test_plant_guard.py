@@ -59,6 +59,11 @@ def test_two_plants_do_not_set_one_clock(plant: Callable[..., Any]) -> None:
 
 
 def test_two_plants_do_not_drive_one_actuator(plant: Callable[..., Any]) -> None:
-    plant("/left", hardware=HARDWARE)
+    left = plant("/left", hardware=HARDWARE)
+    left.serve()
     with pytest.raises(BackendError, match=f"another process drives the actuator on {HARDWARE}"):
         plant("/right", hardware=HARDWARE)
+    left.leave()
+    plant("/middle", hardware=HARDWARE)
+    with pytest.raises(BackendError, match="another process is /left/plant"):
+        plant("/left")

@@ -11,7 +11,6 @@ class NameClaim:
     """A claim to `name`, kept from `take` to `give_back` or to the end of the process."""
 
     def __init__(self, name: str) -> None:
-        self.name = name
         # A socket in the abstract name space of Linux leaves no file behind; its names are short.
         self._address = "\0hydraulic_bench." + hashlib.sha256(name.encode()).hexdigest()
         self._socket: socket.socket | None = None

@@ -24,6 +24,7 @@ HARDWARE_WATCHDOG_S = 0.2
 """Longest silence of a source that a real actuator may be driven through."""
 _LOOK_AROUND_S = 1.0
 """How long after its start a plant on hardware is configured at the earliest: it knows the others then."""
+_HARDWARE = "hardware "
 _LOOK_EVERY = 5  # calls of `watch`
 
 
@@ -34,7 +35,7 @@ class PlantGuard:
         self._node, self._gate, self._backend = node, gate, backend
         self._notices, self._counters = Notices(node.get_logger().warning), Counters()
         self._domain = node.context.get_domain_id()
-        self._claims: list[NameClaim] = []
+        self._claims: dict[str, NameClaim] = {}
         self._marker: RunMarker | None = None
         self._made, self._serves, self._watched = time.monotonic(), False, 0
         self.not_heard = ""
@@ -58,7 +59,7 @@ class PlantGuard:
             )
         hardware = self._backend.hardware(values)
         if hardware:
-            self._claim(f"hardware {hardware}", f"another process drives the actuator on {hardware}: end it")
+            self._claim(f"{_HARDWARE}{hardware}", f"another process drives the actuator on {hardware}: end it")
             time.sleep(max(self._made + _LOOK_AROUND_S - time.monotonic(), 0.0))
         self.check_alone()
         if reason := middleware.reach(os.environ, get_rmw_implementation_identifier()):
@@ -95,9 +96,10 @@ class PlantGuard:
         if self._marker is not None:
             self._marker.end(self._gate.stop_reason)
             self._marker = None
-        if not self._serves:  # else its publisher of `state` lives until the process ends
-            while self._claims:
-                self._claims.pop().give_back()
+        for name in list(self._claims):
+            # Its publishers of `state` and time live until the process ends; the hardware has been let go.
+            if not self._serves or name.startswith(_HARDWARE):
+                self._claims.pop(name).give_back()
 
     def watch(self) -> None:
         """Stop the plant where there is another; log, once while it lasts, what is wrong with those that talk to it."""
@@ -120,11 +122,10 @@ class PlantGuard:
         self._notices.tell(found)
 
     def _claim(self, name: str, refusal: str) -> None:
-        if all(claim.name != name for claim in self._claims):
-            claim = NameClaim(name)
-            if not claim.take():
-                raise BackendError(refusal)
-            self._claims.append(claim)
+        claim = self._claims.get(name) or NameClaim(name)
+        if not claim.take():
+            raise BackendError(refusal)
+        self._claims[name] = claim
 
     def _others(self) -> list[str]:
         """Nodes, without this one, that publish the state in its namespace."""
