@@ -204,7 +204,7 @@ def write_module(library: Library) -> str:
         for which in e.functions()
     )
     return _fill(
-        MODULE, functions=functions, n_rates=layout.n_rates, n_states=len(layout.states),
+        MODULE, stick=stick, functions=functions, n_rates=layout.n_rates, n_states=len(layout.states),
         constants1=w.constants(), switches1=w.switches(), rhs1=rhs, rhs4=rhs,
         bend=REVERSAL_BEND, shorter=REVERSAL_STEP, most=MOST_SUBSTEPS,
         command=shared["command"], position_sensor7=shared["position_sensor"],

@@ -201,10 +201,41 @@ def prime(drive, dt, start, on, P, X, M):
             {command}
 
 
-@njit("i8(f8[::1], f8, f8, f8, i8[::1], i8, i8, f8[:, ::1], f8[:, ::1], u1[::1], f8[::1], u1, f8[:, :, ::1], f8[::1])",
-      cache=True, nogil=True, error_model="numpy")
-def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memories, on, P, hydraulic, Y, failure):
+@njit("void(f8, f8[::1], f8, f8, u1[::1], f8[::1], u1)", cache=True, nogil=True, error_model="numpy")
+def bend(now, X, acceleration, command, on, P, hydraulic):
+    """Bends the bristles so that dry friction lets the piston accelerate like this, as far as it can."""
+    S = X.copy(); K = np.zeros(NR); R = np.zeros(NX - NR); G = np.zeros(NX - NR); AUX = np.zeros(11)
+    low = -1.0; high = 1.0
+    S[{stick}] = low
+    rhs(now, S, command, on, P, hydraulic, K, R, G, AUX)
+    above = K[1] - acceleration
+    S[{stick}] = high
+    rhs(now, S, command, on, P, hydraulic, K, R, G, AUX)
+    below = K[1] - acceleration
+    if above <= below:
+        return
+    if above <= 0.0 or below >= 0.0:
+        X[{stick}] = low if above <= 0.0 else high
+        return
+    for _ in range(4):  # regula falsi; one step does where friction is linear in its direction
+        S[{stick}] = (high * above - low * below) / (above - below)
+        rhs(now, S, command, on, P, hydraulic, K, R, G, AUX)
+        off = K[1] - acceleration
+        if off > 0.0:
+            low = S[{stick}]; above = off
+        elif off < 0.0:
+            high = S[{stick}]; below = off
+        else:
+            break
+    X[{stick}] = S[{stick}]
+
+
+@njit("i8(f8[::1], f8, f8, f8, i8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[::1], u1[::1], f8[::1], u1, f8[:, :, ::1],"
+      " f8[::1])", cache=True, nogil=True, error_model="numpy")
+def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memories, turning, on, P, hydraulic, Y,
+             failure):
     """Runs ``count`` samples from each start, the memories primed over ``past`` samples. Returns the starts done."""
+    {constants1}
     X = np.empty(NX)
     M = np.empty(memories.shape[1])
     for i in range(len(starts)):
@@ -214,6 +245,8 @@ def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memorie
         M[:] = memories[i]
         if past > 0:
             prime(drive[before:first], dt, before * dt, on, P, X, M)
+        if turning[i] == turning[i]:
+            bend(first * dt, X, turning[i], clamp(drive[first] / drive_limit, -1.0, 1.0), on, P, hydraulic)
         ahead = drive[first:first + count]
         done = run(ahead, dt, first * dt, max_step, max_turn, on, P, hydraulic, X, M, Y[i], failure)
         if done < count:

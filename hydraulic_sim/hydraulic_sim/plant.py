@@ -22,6 +22,8 @@ from .trajectory import PlantState, Trajectory
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 FIT_STEP, FIT_REFINEMENT = 1e-3, 2.2  # half as fine: off by a hundredth of the sensors' noise on all benches tried
+FIRM = 5.0  # times the oil's natural frequency: a contact in which the supply leaves 1e-4 of the stroke at most
+HEAVY = 1e6
 FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
 MOST_HALVINGS = 6
 CORRECTED_EVERY = 4  # samples after which a tracked plant is set to what was measured
@@ -73,8 +75,24 @@ class Plant:
 
     @classmethod
     def for_fits(cls, model: Model) -> Plant:
-        """The plant of a model with steps as long as do where sensors' noise hides the integrator's error."""
+        """The plant of a model with steps as long as do where sensors' noise hides the integrator's error.
+
+        End stops that are far stiffer than the oil would ask for short steps everywhere, and are softer.
+        """
+        key = "end_stop.stiffness"
+        if model.kind == "hydraulic" and not model.entry(key).free:
+            values = {k: model.value(k) for k in model.keys()}  # noqa: SIM118, a method of the model
+            enough = values["moving_mass"] * (FIRM * rates.oil(values)) ** 2
+            if values[key] > enough:
+                model = model.with_values({key: enough})
         return cls(model, FIT_STEP, FIT_REFINEMENT)
+
+    def held(self) -> Plant:
+        """This plant with a piston so heavy that no force moves it within a few samples: it goes where it was seen."""
+        other = self.with_parameters({"moving_mass": HEAVY * self.value("moving_mass")})
+        rate = rates.fastest(other._active, other._values(), self.model.kind)
+        other.longest_step = rates.step(rate, FIT_STEP, self.refinement)
+        return other
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -177,13 +195,15 @@ class Plant:
         horizon: int,
         initial_states: ArrayLike,
         memories: Array | None = None,
+        turning: ArrayLike | None = None,
     ) -> dict[str, Array]:
         """Many short runs over one drive, each from a state of its own.
 
         ``starts`` (S,) sample indices into ``drive`` (N,); ``horizon`` samples ahead, ``starts + horizon`` < N;
         ``initial_states`` (S, n_states). Returns channel → (S, horizon + 1), column 0 being the start itself.
         Effects on the command remember the drive before each start, or begin with ``memories`` (S, n_memory) as
-        `track` gives them.
+        `track` gives them. Where ``turning`` (S,) is an acceleration [m/s²], dry friction begins with what that asks
+        for, as far as it can; NaN: with the state ``stick``.
 
         :raises SimulationError: as `simulate` does.
         """
@@ -204,9 +224,10 @@ class Plant:
         past = LONGEST_MEMORY if self._remembers and memories is None else 0
         if memories is None:
             memories = np.zeros((len(first), self.layout.n_memory))
+        asked = np.full(len(first), np.nan) if turning is None else np.require(turning, np.float64, ("C", "W"))
         done = self._compiled.run_many(
-            u, dt, self.longest_step, self._turn, first, horizon + 1, past, states, memories, self._on,
-            self._parameters, self._hydraulic, out, failure,
+            u, dt, self.longest_step, self._turn, first, horizon + 1, past, states, memories, asked,
+            self._on, self._parameters, self._hydraulic, out, failure,
         )  # fmt: skip
         if done < len(first):
             start = int(first[done])
@@ -218,11 +239,6 @@ class Plant:
     def has_inner_states(self) -> bool:
         """Whether an effect that is on has states of its own, which no sensor sees, or never forgets a drive."""
         return any(e.states or (e.slot == "command" and e.memory and e.reach is None) for e in self._active)
-
-    @property
-    def has_dry_friction(self) -> bool:
-        """Whether a force depends on how far the bristles are bent (the state ``stick``)."""
-        return any(name == "direction" for e in self._active for name in arguments(e.kernel))
 
     @property
     def drive_path(self) -> tuple[float | str, ...] | None:
@@ -257,7 +273,7 @@ class Plant:
         if len(first) and (first[0] < 0 or first[-1] >= len(u) or np.any(np.diff(first) < 0)):
             raise SimulationError(f"the starts must rise within 0…{len(u) - 1}")
         self._check_dt(dt)
-        begin = self.initial_state(drive=float(u[0]))
+        begin = self.initial_state(drive=float(u[0]), **self._balanced(measured[0]))
         x, memory, failure = begin.states.copy(), begin.memory.copy(), np.zeros(2)
         states, memories = np.empty((len(first), x.size)), np.empty((len(first), memory.size))
         done = self._compiled.track(
@@ -272,6 +288,16 @@ class Plant:
             if self.layout.library[name].slot.endswith("_sensor"):
                 memories[:, place] = 0.0
         return states, memories
+
+    def _balanced(self, seen: Array) -> dict[str, float]:
+        """Pressures of rest beside the one that was ``seen`` (4,), within supply and tank [Pa]."""
+        a, b = float(seen[2]), float(seen[3])
+        if not self._hydraulic or math.isfinite(a) == math.isfinite(b):
+            return {}
+        ratio = self.value("piston_area_a") / self.value("piston_area_b")
+        low, high = self.value("tank_pressure"), self.value("supply_pressure")
+        name, other = ("pressure_b", a * ratio) if math.isfinite(a) else ("pressure_a", b / ratio)
+        return {name: min(max(other, low), high)}
 
     def check_state(self, state: PlantState) -> None:
         """Refuse a state of another library: compiled code trusts the lengths.

@@ -64,3 +64,29 @@ def test_states_that_follow_from_the_drive_alone_are_those_of_any_plant_with_the
 def test_states_that_the_motion_moves_too_have_no_path_of_the_drive(bench: Model, effect: str) -> None:
     plant = Plant(bench.with_effect(effect))
     assert plant.has_inner_states and plant.drive_path is None
+
+
+def test_a_pressure_without_a_sensor_follows_from_motion_and_valve_whatever_the_forces(bench: Model) -> None:
+    real = Plant(bench.with_effect("constant_load", {"load": 20e3}).with_values({"coulomb_friction.level": 3e3}))
+    drive, seen, starts = slowly(real)
+    moving = starts[starts > 1000]
+    smoothed = np.stack([seen[c] for c in SEEN], axis=-1)
+    smoothed[:, SEEN.index("pressure_b")] = np.nan
+    plant = Plant.for_fits(bench)
+    off = {
+        name: p.track(drive, DT, moving, smoothed)[0][:, 3] - seen["pressure_b"][moving]
+        for name, p in (("held", plant.held()), ("free", plant))
+    }
+    assert np.abs(off["held"]).max() < 0.01 * bench.value("supply_pressure")
+    assert np.abs(off["held"]).max() < 0.2 * np.abs(off["free"]).max()
+
+
+def test_a_stop_far_stiffer_than_the_oil_asks_for_no_short_steps_in_fits(bench: Model) -> None:
+    light = bench.without_effect("coulomb_friction").with_entry("moving_mass", value=1.0, bounds=(0.5, 2.0))
+    light = light.with_values({"piston_area_a": 2e-4, "piston_area_b": 2e-4, "viscous_friction.coefficient": 100.0})
+    fit, exact = Plant.for_fits(light), Plant(light)
+    assert fit.longest_step > 3.0 * exact.longest_step
+    assert fit.value("end_stop.stiffness") < light.value("end_stop.stiffness") == exact.value("end_stop.stiffness")
+    assert Plant.for_fits(bench).value("end_stop.stiffness") == bench.value("end_stop.stiffness")
+    free = light.with_entry("end_stop.stiffness", free=True)
+    assert Plant.for_fits(free).value("end_stop.stiffness") == light.value("end_stop.stiffness")

@@ -159,7 +159,7 @@ def test_another_noise_judges_the_same_deviations() -> None:
     assert np.allclose(2.0 * judged.deviation(run, none), segments.deviation(run, none))
     assert np.allclose(judged.in_units(judged.deviation(run, none)), -1.0)
     measured = [k for k, free in enumerate(segments.unmeasured_pressures) if not free and segments.free[k] != 1]
-    assert np.allclose(judged.prior_std[measured], 2.0 * segments.prior_std[measured])
+    assert np.allclose(judged.prior_std[:, measured], 2.0 * segments.prior_std[:, measured])
 
 
 def test_of_one_pressure_in_each_record_both_may_be_late() -> None:

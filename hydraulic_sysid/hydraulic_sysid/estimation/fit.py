@@ -73,13 +73,13 @@ class FitPoint:
         robust: bool = False,
         priors: Priors = NO_PRIORS,
     ) -> FitPoint:
-        """A model as it is, initial states moved once to where they fit best, from other starts where stuck."""
+        """A model as it is, initial states moved once to where they fit best."""
         shooting = Shooting(plant, segments)
         point = cls(shooting, Parameters.of(plant.model, keys, priors), shooting.initial_states, [], robust)
         if any(s.unmeasured_pressures.any() for s in segments):
             raw = shooting.residuals(point.plant, shooting.initial_states)
             shooting = replace(shooting, misfit=_misfit(segments, raw))
-        return point.settled(shooting, point.parameters).freed()
+        return point.settled(shooting, point.parameters)
 
     @property
     def plant(self) -> Plant:
@@ -129,22 +129,23 @@ class FitPoint:
     def moved(self, change: Array) -> FitPoint | None:
         """A change (P,) of the parameters away; None where the plant does not run there.
 
-        Initial states begin where they will fit best, to first order; the directions in which they act are kept.
+        Initial states begin where they will fit best, to first order, or where they only follow the parameters: in
+        segments far from linear the former may lead nowhere. The directions in which they act are kept.
         """
-        ahead = [p.raw + c @ change for p, c in zip(self.projections, self.columns, strict=True)]
-        states = self.shooting.corrected(self.initial_states, self.projections, ahead)
+        shooting, steps = self.shooting, [c @ change for c in self.columns]
         parameters = self.parameters.moved(change)
-        plant = self.shooting.plant.with_parameters(parameters.by_key)
+        plant = shooting.plant.with_parameters(parameters.by_key)
+        starts = [
+            shooting.corrected(self.initial_states, self.projections, ahead)
+            for ahead in (steps, [p.raw + s for p, s in zip(self.projections, steps, strict=True)])
+        ]
         try:
-            initial_states, projections = self.shooting.settled(plant, states, self.projections)
+            states, raw = shooting.better(plant, *starts)
+            before = [p.with_raw(r) for p, r in zip(self.projections, raw, strict=True)]
+            initial_states, projections = shooting.improved(plant, states, before)
         except SimulationError:
             return None
         return replace(self, parameters=parameters, initial_states=initial_states, projections=projections)
-
-    def freed(self) -> FitPoint:
-        """The same parameters, with other starts of segments that are stuck."""
-        states, projections = self.shooting.freed(self.plant, self.initial_states, self.projections)
-        return replace(self, initial_states=states, projections=projections)
 
     def with_new_directions(self, least: float) -> FitPoint:
         """This point, its directions of the initial states taken anew where they are old.

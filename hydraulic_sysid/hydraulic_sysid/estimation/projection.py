@@ -66,13 +66,6 @@ class Projection:
         """Other residuals (S, m), the same directions."""
         return replace(self, raw=raw)
 
-    def with_segments(self, chosen: Mask, other: Projection) -> Projection:
-        """The ``chosen`` (S,) segments replaced by those of another."""
-        found = {f.name: getattr(self, f.name).copy() for f in fields(self)}
-        for name, values in found.items():
-            values[chosen] = getattr(other, name)
-        return Projection(**found)
-
     def subset(self, chosen: Mask) -> Projection:
         """Of the ``chosen`` (S,) segments alone."""
         return Projection(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})

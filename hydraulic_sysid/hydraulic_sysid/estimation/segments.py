@@ -31,10 +31,14 @@ _STATES = ("position", "velocity", "pressure_a", "pressure_b")  # the first of e
 _FEWEST = 20  # samples of a segment
 _SMOOTHING = 15  # samples of the quadratic through which initial values are read
 STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
+_TURNING = 0.005  # s: over twice that the acceleration of a piston that hardly moves is read
 # Of the noise: how far an initial state may be off what was measured there. Sensors with an offset or a wrong scale are
 # off by far more than their noise, and the samples of the segment hold the initial state anyway.
 _PRIOR = {"position": 1000.0, "pressure_a": 200.0, "pressure_b": 200.0}
-_UNMEASURED_PRESSURE = 2e6  # Pa
+# Of the supply pressure: how far a pressure without a sensor may be off what motion and valve say …
+_UNMEASURED_PRESSURE = 0.2  # … before the piston has moved, when nothing has said anything yet, …
+_TRACKED_PRESSURE = 0.05  # … and later: as a land loses where its flow is off by a twentieth
+_FORGOTTEN = 0.5  # of the range of a record, after which such a pressure no longer depends on what it began with
 _VELOCITY = 0.2  # m/s
 _SETTLING = 0.1  # s of a record after which states that no sensor sees have forgotten what they began with
 _NUMERICAL = 1e-6  # of a channel's range: a noise-free record is not held to less
@@ -45,13 +49,14 @@ _LEAST_NOISE = float(np.finfo(float).tiny) ** 0.5  # of a channel that stands st
 class Segments:
     """The segments of one record.
 
-    ``first`` (S,) sample indices, ``samples`` per segment; ``measured`` (S, samples, C) [SI] with the ``noise`` of each
-    channel; ``smoothed`` (N, 4) position, velocity and pressures of the whole record, NaN where they were not measured;
-    ``free`` the indices of the states that are estimated, F of them, and ``prior_std`` (F,) how far each may be off
-    [the state's unit]; ``timing``: how the channels were recorded; ``hum``: mains lines [Hz] in each; ``outliers``
-    (S, samples, C): samples that do not count; ``nuisance`` (S, samples·C, K), whitened: what may be off in every
-    segment by about one of each column, such as hum and laws that are not quite those of the bench; ``disturbance``
-    (S, samples, C, D) [SI]: what else may be, known from before.
+    ``first`` (S,) sample indices, ``samples`` per segment; ``measured`` (S, samples, C) [SI] with the ``noise`` of
+    each channel; ``smoothed`` (N, 4) position, velocity and pressures of the whole record, NaN where they were not
+    measured; ``free`` the indices of the states that are estimated, F of them, and ``prior_std`` (S, F) how far
+    each may be off [the state's unit; pressures without a sensor: of the supply pressure]; ``timing``: how the
+    channels were recorded; ``hum``: mains lines [Hz] in each; ``outliers`` (S, samples, C): samples that do not
+    count; ``nuisance`` (S, samples·C, K), whitened: what may be off in every segment by about one of each column,
+    such as hum and laws that are not quite those of the bench; ``disturbance`` (S, samples, C, D) [SI]: what else
+    may be, known from before.
     """
 
     record: Record
@@ -79,6 +84,7 @@ class Segments:
         return replace(
             self,
             first=self.first[chosen],
+            prior_std=self.prior_std[chosen],
             measured=self.measured[chosen],
             outliers=self.outliers[chosen],
             nuisance=self.nuisance[chosen],
@@ -132,13 +138,16 @@ class Segments:
         return np.stack(found, axis=2).reshape(len(values), -1, *values.shape[3:])
 
     def initial_states(self, plant: Plant) -> Array:
-        """Where a plant's states begin (S, n_states): as measured, the rest at ease."""
+        """Where a plant's states begin (S, n_states): as measured, the rest at ease.
+
+        A pressure without a sensor is that beyond what follows from motion and valve (`Shooting`), and so 0.
+        """
         states = np.tile(plant.initial_state().states, (len(self), 1))
         command = np.clip(self.record["drive"] / plant.value("drive_limit"), -1.0, 1.0)
         begin = self.smoothed[self.first]
         for column, name in enumerate(plant.state_names):
             if name in _STATES:
-                states[:, column] = np.where(np.isfinite(begin[:, column]), begin[:, column], states[:, column])
+                states[:, column] = np.where(np.isfinite(begin[:, column]), begin[:, column], 0.0)
             elif name == "stick":
                 states[:, column] = np.clip(begin[:, _STATES.index("velocity")] / STICK_SPEED, -1.0, 1.0)
             elif plant.layout.state_records[name].initial == "command":
@@ -156,6 +165,20 @@ class Segments:
             [n.colour(white[:, :, c] * self.loudness[:, c, None]) for c, n in enumerate(self.noise)], axis=-1
         )
 
+    @cached_property
+    def turning(self) -> Array:
+        """(S,) acceleration with which segments begin [m/s²] whose piston hardly moves there, NaN for the others."""
+        velocity = self.smoothed[:, _STATES.index("velocity")]
+        around = max(1, round(_TURNING / self.record.dt))
+        slope = savgol_filter(velocity, 2 * around + 1, 1, deriv=1, delta=self.record.dt)
+        found = slope[np.minimum(self.first + around, len(slope) - 1)]  # of what follows: before, it may have braked
+        return np.where(np.abs(velocity[self.first]) < STICK_SPEED, found, np.nan)
+
+    @property
+    def tracked(self) -> list[int]:
+        """States that are pressures without a sensor."""
+        return [int(k) for k, pressure in zip(self.free, self.unmeasured_pressures, strict=True) if pressure]
+
     @property
     def unmeasured_pressures(self) -> Mask:
         """(F,) which of the estimated states are pressures without a sensor."""
@@ -167,7 +190,7 @@ class Segments:
         for place, index in enumerate(self.free):
             if _STATES[index] in self.channels:
                 channel = self.channels.index(_STATES[index])
-                prior[place] *= noise[channel].std / self.noise[channel].std
+                prior[:, place] *= noise[channel].std / self.noise[channel].std
         return replace(self, noise=tuple(noise), prior_std=prior, nuisance=self.nuisance[..., :0])
 
 
@@ -230,13 +253,21 @@ def _cut(record: Record, hydraulic: bool, length: float, robust: bool, left_out:
     measured = np.stack([record[c][index] for c in channels], axis=-1)
     prior = {"velocity": _VELOCITY} | {c: _PRIOR[c] * n.std for c, n in zip(channels, noise, strict=True)}
     free = np.arange(len(_STATES) if hydraulic else 2)
-    prior_std = np.array([prior.get(_STATES[k], _UNMEASURED_PRESSURE) for k in free])
+    smoothed = _smoothed(record, signals)
+    unknown = np.where(_moved(smoothed[:, 0])[first], _TRACKED_PRESSURE, _UNMEASURED_PRESSURE)
+    prior_std = np.stack([np.broadcast_to(prior.get(_STATES[k], unknown), first.shape) for k in free], axis=-1)
     return Segments(
-        record, first, samples, channels, noise, measured, _smoothed(record, signals), free, prior_std,
+        record, first, samples, channels, noise, measured, smoothed, free, prior_std,
         tuple(Timing() for _ in channels), tuple(() for _ in channels),
         np.stack([alone[c][index] for c in channels], axis=-1), np.zeros((number, samples * len(channels), 0)),
         np.zeros((*measured.shape, 0)), np.ones((number, len(channels))),
     )  # fmt: skip
+
+
+def _moved(position: Array) -> Mask:
+    """From which sample on a record (N,) has seen the piston move far enough to flush both chambers."""
+    reach = np.maximum.accumulate(position) - np.minimum.accumulate(position)
+    return np.asarray(reach > _FORGOTTEN * np.ptp(position))
 
 
 def unjudged(record: Record) -> int:

@@ -5,18 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TypeVar
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array, Mask
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.plant import Plant
 
 from .parameters import Parameters
 from .projection import Projection
-from .segments import STICK_SPEED, Segments
+from .segments import Segments
 
 T = TypeVar("T")
 
@@ -26,29 +26,39 @@ _LEAST_STEP = 0.1  # … or of so much of its scale
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel
 _VELOCITY_STEP = 1e-3  # m/s
 _PRESSURE_STEP = 1e5  # Pa, where the pressure is not measured
-_HOLDING = (-0.9, -0.5, 0.0, 0.5, 0.9)  # parts of its force with which dry friction may hold a piston at rest
-_STUCK = 1.5  # mean square of a segment, of the median, from which its start is sought anew
 
 
 @dataclass(frozen=True)
 class Inner:
-    """States of a plant that no sensor sees: their ``columns``, values (S, n_states) and the memories of its laws."""
+    """States of a plant that no sensor sees: their ``columns``, values (S, n_states) and the memories of its laws.
+
+    ``pressures``: columns and values of those that are counted from there.
+    """
 
     columns: list[int]
     values: Array
     memories: Array | None
+    pressures: tuple[list[int], Array] | None = None
 
     def into(self, states: Array) -> tuple[Array, Array | None]:
         """These states (S, n_states) with the inner ones in their place."""
-        if self.columns:
+        if self.columns or self.pressures:
             states = states.copy()
+        if self.columns:
             states[:, self.columns] = self.values[:, self.columns]
+        if self.pressures:
+            columns, values = self.pressures
+            states[:, columns] += values[:, columns]
         return states, self.memories
 
 
 @dataclass(frozen=True)
 class Shooting:
     """A plant and the segments it is run over; initial states are passed in, per record (S, n_states).
+
+    A pressure that nobody measured follows from motion and valve along the record; its initial state is what it is
+    beyond that. Where a segment begins with a piston that hardly moves, dry friction is what its
+    acceleration asks for, as far as it can be.
 
     ``misfit``: how many times the noise the model is off. While it is far off, pressures that nobody measured would
     take up its errors and leave all physical bounds; their priors count that many times.
@@ -76,68 +86,35 @@ class Shooting:
         """Eliminate the initial states around those given."""
         return self._map(lambda i: self._projection(plant, i, initial_states[i]), range(len(self.segments)))
 
-    def settled(
-        self, plant: Plant, initial_states: Sequence[Array], directions: Sequence[Projection] = ()
-    ) -> tuple[list[Array], list[Projection]]:
-        """Initial states where the residual is smallest, to first order, and what is left there.
-
-        The ``directions`` in which they act, by default those before the move, hardly change with it. An initial state
-        that the move makes worse stays where it was.
-        """
-        if directions:
-            before = [p.with_raw(r) for p, r in zip(directions, self.residuals(plant, initial_states), strict=True)]
-        else:
-            before = self.projections(plant, initial_states)
-        return self.improved(plant, initial_states, before)
+    def settled(self, plant: Plant, initial_states: Sequence[Array]) -> tuple[list[Array], list[Projection]]:
+        """Initial states where the residual is smallest, to first order, and what is left there."""
+        return self.improved(plant, initial_states, self.projections(plant, initial_states))
 
     def improved(
         self, plant: Plant, initial_states: Sequence[Array], before: Sequence[Projection]
     ) -> tuple[list[Array], list[Projection]]:
-        """As `settled`, from residuals and directions that are known."""
-        moved = self.corrected(initial_states, before, [p.raw for p in before])
-        states, projections = [], []
-        for old, new, raw, p in zip(initial_states, moved, self.residuals(plant, moved), before, strict=True):
-            with np.errstate(over="ignore"):  # a run that leaves all bounds is infinitely far off
-                better = (np.sum(raw**2, axis=1) <= np.sum(p.raw**2, axis=1))[:, None]
-            states.append(np.where(better, new, old))
-            projections.append(p.with_raw(np.where(better, raw, p.raw)))
-        return states, projections
+        """As `settled`, from residuals and directions that are known, which hardly change with the move.
 
-    def freed(
-        self, plant: Plant, initial_states: Sequence[Array], projections: Sequence[Projection]
-    ) -> tuple[list[Array], list[Projection]]:
-        """Initial states and what is left there, with another start where one is stuck.
-
-        Which part of dry friction holds a piston at rest shows in no sensor; a segment that begins with a wrong one
-        rings. Those that begin at rest, and leave clearly more than most, are started from several.
+        An initial state that the move makes worse stays where it was.
         """
-        costs = [np.sum(p.residual**2, axis=1) / s.counted for p, s in zip(projections, self.segments, strict=True)]
-        limit, velocity = _STUCK * float(np.median(np.concatenate(costs))), plant.state_names.index("velocity")
-        done = [
-            self._freed(
-                plant, i, states, p, (cost > limit) & (np.abs(self.initial_states[i][:, velocity]) < STICK_SPEED)
-            )
-            for i, (states, p, cost) in enumerate(zip(initial_states, projections, costs, strict=True))
-        ]
-        return [states for states, _ in done], [p for _, p in done]
+        moved = self.corrected(initial_states, before, [p.raw for p in before])
+        states, raw = self._better((initial_states, [p.raw for p in before]), (moved, self.residuals(plant, moved)))
+        return states, [p.with_raw(r) for p, r in zip(before, raw, strict=True)]
 
-    def _freed(
-        self, plant: Plant, i: int, states: Array, projection: Projection, stuck: Mask
-    ) -> tuple[Array, Projection]:
-        if not stuck.any() or not plant.has_dry_friction:
-            return states, projection
-        part = Shooting(plant, [self.segments[i].subset(stuck)], self.misfit)
-        best, left = states[stuck], projection.subset(stuck)
-        for holding in _HOLDING:
-            begin = part.initial_states[0].copy()
-            begin[:, plant.state_names.index("stick")] = holding
-            begin[:, plant.state_names.index("velocity")] = 0.0
-            (tried,), (other,) = part.settled(plant, [begin])
-            better = np.sum(other.residual**2, axis=1) < np.sum(left.residual**2, axis=1)
-            best, left = np.where(better[:, None], tried, best), left.with_segments(better, other.subset(better))
-        freed = states.copy()
-        freed[stuck] = best
-        return freed, projection.with_segments(stuck, left)
+    def better(self, plant: Plant, one: Sequence[Array], other: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+        """Of two initial states of every segment those that leave less, and their residuals (S, m)."""
+        return self._better((one, self.residuals(plant, one)), (other, self.residuals(plant, other)))
+
+    def _better(
+        self, one: tuple[Sequence[Array], Sequence[Array]], other: tuple[Sequence[Array], Sequence[Array]]
+    ) -> tuple[list[Array], list[Array]]:
+        states, residuals = list[Array](), list[Array]()
+        for old, raw, new, again in zip(*one, *other, strict=True):
+            with np.errstate(over="ignore"):  # a run that leaves all bounds is infinitely far off
+                better = (np.sum(again**2, axis=1) <= np.sum(raw**2, axis=1))[:, None]
+            states.append(np.where(better, new, old))
+            residuals.append(np.where(better, again, raw))
+        return states, residuals
 
     def corrected(
         self, initial_states: Sequence[Array], projections: Sequence[Projection], residuals: Sequence[Array]
@@ -177,7 +154,8 @@ class Shooting:
         segments = self.segments[i]
         run = self._run(plant, i, states, inner)
         off = (self.initial_states[i] - states)[:, segments.free] / segments.prior_std
-        off = np.where(segments.unmeasured_pressures, self.misfit * off, off)
+        if segments.tracked:
+            off = np.where(segments.unmeasured_pressures, self.misfit / self.plant.value("supply_pressure") * off, off)
         return segments.deviation(run, off)
 
     def simulated(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
@@ -194,11 +172,21 @@ class Shooting:
         segments = self.segments[i]
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.record["drive"] if drive is None else drive
-        run = plant.predict(drive, segments.record.dt, segments.first, segments.samples - 1, states, memories)
+        turning = segments.turning
+        run = plant.predict(drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, turning)
         return np.stack([run[c] for c in segments.channels], axis=-1)
 
     def _inner(self, plant: Plant, i: int) -> Inner:
         """States that no sensor sees, propagated along the record up to each segment."""
+        found, segments = self._driven_states(plant, i), self.segments[i]
+        if not segments.tracked:
+            return found
+        # The piston moves as it was seen to, whatever its forces.
+        values, _ = plant.held().track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
+        return replace(found, pressures=(segments.tracked, values))
+
+    def _driven_states(self, plant: Plant, i: int) -> Inner:
+        """Those that laws have of their own."""
         if not plant.has_inner_states:
             return Inner([], np.empty(0), None)
         path = plant.drive_path
