@@ -24,6 +24,7 @@ LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 FIT_STEP, FIT_REFINEMENT = 1e-3, 2.2  # half as fine: off by a hundredth of the sensors' noise on all benches tried
 FIRM = 5.0  # times the oil's natural frequency: a contact in which the supply leaves 1e-4 of the stroke at most
 HEAVY = 1e6
+_READINGS = 4  # of the outputs, the first: what sensors read
 FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
 MOST_HALVINGS = 6
 CORRECTED_EVERY = 4  # samples after which a tracked plant is set to what was measured
@@ -233,6 +234,11 @@ class Plant:
             start = int(first[done])
             into = min(max(int((failure[0] - start * dt) / dt + 1e-6), 0), horizon)
             raise self._failed(failure, start + into, u, out[done, into], f"the run from sample {start} failed")
+        if not np.isfinite(out[:, :, :_READINGS]).all():
+            i, k = np.argwhere(~np.isfinite(out[:, :, :_READINGS]).all(axis=2))[0]
+            raise SimulationError(
+                f"{self.model.name!r}: a sensor reads nothing finite at sample {first[i] + k}: {out[i, k, :_READINGS]}"
+            )
         return {name: out[:, :, i] for i, name in enumerate(base.OUTPUTS)}
 
     @property

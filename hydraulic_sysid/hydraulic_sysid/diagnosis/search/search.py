@@ -66,7 +66,7 @@ MOST_SWAPS = 3
 MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
 ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
 HOPELESS = 0.6  # of what noise does not explain: where less is explained, exchanging effects will not do either
-PROMISED = 0.5  # of what an effect must explain, which its quick refit must show for it to be fitted to the end
+PROMISED = 0.5  # of what an effect must explain, or the best number, which must show for another to be fitted
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
 LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
 
@@ -284,7 +284,8 @@ class Search:
         while significant(done.misfit.total - final.misfit.total, final.misfit.count, final.misfit.variance):
             named = [d.key for d in moved]
             tried = []
-            for suspect in suspects(final.linearisation, self.given, named)[:SUSPECTS]:
+            promising = suspects(final.linearisation, self.given, named)[:SUSPECTS]
+            for suspect in [p for p in promising if p.cost >= PROMISED * promising[0].cost]:
                 self.say(f"fitting with another {suspect.key}")
                 state = self.state(restored(final.model, self.given, [*named, suspect.key]), self._last)
                 tried.append((state, replace(suspect, cost=done.misfit.total - state.misfit.total)))
@@ -300,7 +301,8 @@ class Search:
             if done.misfit.total - back.misfit.total < done.misfit.least:
                 break
             done = back
-        moved = [replace(d, instead=self.instead(bare, done, d, moved)) for d in moved]
+        if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
+            moved = [replace(d, instead=self.instead(bare, done, d, moved)) for d in moved]
         misfits = found.misfits
         if misfits:
             misfits = {**misfits, next(reversed(misfits)): done.misfit}
