@@ -44,6 +44,7 @@ PERIODIC_PLACES = (
     ("unknown_supply", "time"), ("unknown_opening", "opening"), ("unknown_opening", "time"),
 )  # fmt: skip
 """Where something may go round and round: threads and magnets, neighbouring machines, pumps, ports."""
+LEAST = 0.5  # of what noise does not explain, which a law must explain to be worth a file
 _FIRST = FitSettings(most_steps=8, least_gain=5e-3)
 _USUAL = (0.01, 0.99)  # quantiles of a variable between which a spline has its knots
 _EDGE = 0.02  # of the range of a variable, by which knots reach beyond it
@@ -108,7 +109,7 @@ class _Fit:
 def propose(
     left: Remaining, name: str, records: Sequence[str], say: Callable[[str], None] = lambda _: None
 ) -> ProposedEffect | None:
-    """The effect that explains most of what is left; None where no curve explains anything.
+    """The effect that explains most of what is left; None where none explains half of it.
 
     :param name: of the effect, which is that of its file
     :param records: names of those that it is learned from
@@ -125,9 +126,11 @@ def propose(
         if not found:
             return None
         first = min(found, key=lambda f: f.cost)
+        share = min((_cost(part) - first.cost) / max(unexplained(part), 1e-300), 1.0)
+        if share < LEAST:
+            return None
         say(f"the law over {first.candidate.words}")
         final = _law(first) or first.candidate
-    share = min((_cost(part) - first.cost) / max(unexplained(part), 1e-300), 1.0)
     effect = final.place.effect
     evidence = (
         f"Of what the model leaves beyond the noise, such a curve over the {final.words} explains {percent(share)}, "
@@ -188,7 +191,8 @@ def _fitted(part: Linearisation, candidate: _Candidate, file: Path, records: Seq
     place, fitted, name = candidate.place, candidate.fitted, file.stem
     file.parent.mkdir()
     file.write_text(effect_text(place.effect, place.variable, fitted, _extent(place.values), "A first fit.", records))
-    model = replace(part.model, user_effects=(*part.model.user_effects, *FILES, file)).with_effect(name)
+    hat = [f for f in FILES if f.stem == place.effect.name]  # is needed when the law is taken: compiled once for both
+    model = replace(part.model, user_effects=(*part.model.user_effects, *hat, file)).with_effect(name)
     own = [f"{name}.{p}" for p in (*fitted.law.coefficients, *fitted.law.shapes)]
     keys, priors = (*part.parameters.keys, *own), _priors(part)
     done = fit_segments(Plant.for_fits(model), part.split.segments, keys, _FIRST, priors=priors)
@@ -213,7 +217,8 @@ def _priors(part: Linearisation) -> Priors:
 def _law(fit: _Fit) -> _Candidate | None:
     """The candidate with the law that explains most where it was fitted."""
     place, knots = fit.candidate.place, fit.candidate.knots
-    here = next((p for p in places(fit.at, lambda _: None) if _key(p) == _key(place)), None)
+    every = places(fit.at, lambda _: None, (place.effect.name,))
+    here = next((p for p in every if _key(p) == _key(place)), None)
     normal = None if here is None else curve_normal(fit.at, here, knots)
     if normal is None:
         return None

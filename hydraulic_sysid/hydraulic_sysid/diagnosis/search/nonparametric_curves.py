@@ -8,7 +8,7 @@ model and nothing is differentiated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,12 +76,17 @@ def nonparametric_curves(at: Linearisation, say: Callable[[str], None]) -> list[
     return sorted((c for c in found if c is not None), key=lambda c: -c.reduction)
 
 
-def places(at: Linearisation, say: Callable[[str], None]) -> Iterator[Place]:
-    """Those that the plant has, with every variable that the records show and that moves."""
-    more = [f for f in FILES if f not in at.model.user_effects]
-    model = replace(at.model, user_effects=(*at.model.user_effects, *more))
+def places(at: Linearisation, say: Callable[[str], None], names: Container[str] | None = None) -> Iterator[Place]:
+    """Those that the plant has, with every variable that the records show and that moves.
+
+    :param names: of the places that are asked for; fewer compile faster (default: all)
+    """
+    files = [f for f in FILES if names is None or f.stem in names]
+    model = replace(
+        at.model, user_effects=(*at.model.user_effects, *(f for f in files if f not in at.model.user_effects))
+    )
     seen = _seen(at)
-    for file in FILES:
+    for file in files:
         try:
             extended = model.with_effect(file.stem)
             extended.check_complete()
