@@ -241,6 +241,11 @@ class Client:
         kind = interface_class(find_topic(name).type)
         return self.node.create_publisher(kind, topic(name, namespace), profile(name))
 
+    def withdraw(self, publisher: Any) -> None:
+        """Destroy a publisher, in the thread that waits for its events: from another one it would fall over it."""
+        self._executor.create_task(self.node.destroy_publisher, publisher)
+        self.wake()
+
     def call(self, kind: str, name: str, patience: float = PATIENCE_S, **fields: Any) -> Any:
         """Response of a service of type `kind` ("std_srvs/srv/Trigger") at the full name `name`.
 

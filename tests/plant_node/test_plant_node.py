@@ -253,7 +253,7 @@ def test_one_plant_per_name(start: Any, client: Any, wait_until: Any, journal: P
     assert health["plant level"] == "2" and "enabled False" in journal.read_text().splitlines()
     answer = client.call("std_srvs/srv/Trigger", "/actuator/reset")
     assert not answer.success and "/test/test_client" in answer.message
-    client.node.destroy_publisher(impostor)
+    client.withdraw(impostor)
     wait_until(lambda: client.call("std_srvs/srv/Trigger", "/actuator/reset").success, "a reset once it has left")
     assert first.output().count("another plant: /test/test_client publishes") <= 2, "a warning and the stop itself"
     assert enable(client).success
