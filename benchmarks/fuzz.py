@@ -1,6 +1,6 @@
 """Random and hostile messages, frames, parameters and files against the bench: nothing may move that must not.
 
-    python benchmarks/fuzz.py [--count 1000000] [--seed 2026] [--target NAME …] [--batch N] [--no-graph]
+    python benchmarks/fuzz.py [--count 1000000] [--seed 2026] [--target NAME …] [--batch N]
 
 Counted are messages, frames, values and files. Every batch has a seed of its own, that of the run, its target's name
 and its number; a finding is printed with them and can be repeated: ``--target NAME --seed S --batch N``. With
@@ -16,7 +16,7 @@ import time
 import traceback
 from pathlib import Path
 
-from abuse import Target, files, pages, run_batch, streams, wire
+from abuse import Target, files, graph, pages, run_batch, streams, wire
 
 TARGETS: dict[str, tuple[Target, float]] = {
     "commands": (streams.commands, 0.5),
@@ -31,8 +31,9 @@ TARGETS: dict[str, tuple[Target, float]] = {
     "model files": (files.model_files, 0.002),
     "bags": (files.bags, 0.001),
     "reports": (pages.reports, 0.001),
+    "graph": (graph.graph, 0.02),
 }
-"""Target and its share of the count."""
+"""Target and its share of the count; `graph` is running nodes, one start for a batch."""
 
 
 def fuzz(name: str, count: float, seed: int, only: int | None = None) -> tuple[int, list[str]]:
