@@ -112,19 +112,19 @@ class Bench:
                 self.start(name)
         self.observer.wait(lambda: self.observer.plant_state(PATIENCE_S) == "active", "an active plant", PATIENCE_S)
         self.observer.enable()
-        if source == "controller":
-            self._refer_anew()
-        self.observer.wait(self.moves, f"a drive of the {source}", PATIENCE_S)
-
-    def _refer_anew(self) -> None:
-        """Where the controller does not move: a reference that it has dropped is followed anew after a pause."""
         deadline = time.monotonic() + PATIENCE_S
-        while not self.moves() and time.monotonic() < deadline:
-            self.observer.each = lambda: None
-            time.sleep(2.0 * PAUSE_S)
-            self.observer.each = self.refer
+        while not self.moves():
+            if time.monotonic() > deadline:
+                said = " | ".join(self.processes[source].said.splitlines()[-4:])
+                raise RunningError(f"no drive of the {source} within {PATIENCE_S:g} s; it says: {said}")
+            if not self.processes[source].runs:  # an excitation that gave up a plant which was killed
+                self.start(source)
+            if source == "controller":  # a reference that it has dropped is followed anew after a pause
+                self.observer.each = lambda: None
+                time.sleep(2.0 * PAUSE_S)
+                self.observer.each = self.refer
             with contextlib.suppress(RunningError):
-                self.observer.wait(self.moves, "a drive", 5.0)
+                self.observer.wait(self.moves, "a drive", 8.0)
 
     def moves(self) -> bool:
         """Whether a drive has been applied within the last tenth of a second."""
