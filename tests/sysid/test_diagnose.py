@@ -8,7 +8,9 @@ import pytest
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict
+from hydraulic_sysid.diagnosis.search import search as search_module
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
+from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, as_filed, beyond, relaxed
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
@@ -173,6 +175,31 @@ def test_where_nothing_need_be_missing_an_effect_must_explain_what_is_left(model
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     assert bool(decisive(found).added) is named
     assert decisive(found).final is (final if named else base)
+
+
+@pytest.mark.parametrize(
+    ("without", "other", "distinguishable", "named"),
+    [
+        (1.30, "sensor_scale", False, False),  # a twentieth of all, and a sensor would do as well
+        (1.30, "sensor_scale", True, True),
+        (1.30, "turbulent_leakage", False, True),  # a tie within its subsystem says where it is
+        (1.90, "sensor_scale", False, True),  # it explains too much to be a matter of laws
+    ],
+)
+def test_a_small_further_effect_that_may_be_anything_is_not_named(
+    model, monkeypatch: pytest.MonkeyPatch, without: float, other: str, distinguishable: bool, named: bool
+) -> None:
+    one = model.with_effect("stribeck_friction")
+    base, before = state(model, 3000 * 5.0, {}), state(one, 3000 * without, {})
+    final = state(one.with_effect("external_leakage"), 3000 * 1.1, {})
+    rival = CompetingModel(other, one, before.misfit, 0.0, distinguishable, 1.0)
+    monkeypatch.setattr(search_module, "competing_models", lambda name, state, misfit: [rival])
+    misfits = {"stribeck_friction": before.misfit, "external_leakage": final.misfit}
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {"external_leakage": before})
+    kept = decisive(found)
+    assert kept.added == ["stribeck_friction", "external_leakage"][: 1 + named]
+    assert kept.final is (final if named else before)
+    assert kept.misfits[kept.added[-1]] == kept.final.misfit
 
 
 def test_a_fit_with_a_number_at_its_bound_is_also_begun_beyond_it(model) -> None:

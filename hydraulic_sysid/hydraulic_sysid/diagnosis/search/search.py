@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
+import numpy as np
+
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
@@ -20,8 +22,10 @@ from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
 from hydraulic_sysid.estimation.parameters import bounded
 from hydraulic_sysid.estimation.refinement import refined, usable
+from hydraulic_sysid.estimation.segments import Segments
 
 from .candidates import candidates, observed, subsystem
+from .competing_models import competing_models
 from .data_sheet import Deviation, beyond, priors, relaxed, restored, significant, suspects
 from .drive_faults import costs_with
 from .errors import DiagnosisError
@@ -45,6 +49,7 @@ FAR = 5.0  # … if it leaves no more than so many times what the best leaves
 MOST_EFFECTS = 3
 FURTHER = 0.25  # of what is left, which a further effect must explain, unless it explains a good part of all
 NEEDED = 0.02  # of all that was explained, which an effect must explain beside the others to stay
+SUBORDINATE = 0.1  # of all that was explained, below which a further effect must be told apart to be named
 LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
 ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
@@ -505,11 +510,34 @@ class Search:
 
 
 def decisive(found: SearchResult) -> SearchResult:
-    """A search without its effects where so little was left that none need be missing, and they leave much of that."""
+    """A search without the effects that its data do not name.
+
+    None where so little was left that nothing need be missing, and they leave much of that; and no further one that
+    explains little and may as well be something of another subsystem: that is how far laws are off those of the bench.
+    """
     base, final = found.base.misfit, found.final.misfit
     if found.added and base.little and unexplained(base, final) > SMALL_UNEXPLAINED:
         return replace(found, final=found.base, misfits={}, competing={})
+    for name in reversed(found.added[1:]):
+        if vague(found, name):
+            misfits = {other: misfit for other, misfit in found.misfits.items() if other != name}
+            competing = {other: state for other, state in found.competing.items() if other != name}
+            without = found.competing[name]
+            misfits[next(reversed(misfits))] = without.misfit
+            return decisive(replace(found, final=without, misfits=misfits, competing=competing))
     return found
+
+
+def vague(found: SearchResult, name: str) -> bool:
+    """Whether an effect explains little of all, and no more than something of another subsystem would."""
+    base, final, library = found.base.misfit, found.final.misfit, found.model.library
+    without = found.competing.get(name)
+    if without is None or without is found.base:
+        return False
+    share = (without.misfit.total - final.total) / max(base.total - final.total, 1e-9)
+    others = [c.name for c in competing_models(name, without, final) if not c.distinguishable]
+    own = subsystem(library[name])
+    return share < SUBORDINATE and any(subsystem(library[other]) != own for other in others)
 
 
 def together(faults: Sequence[RecordingFault], found: RecordingFault) -> list[RecordingFault]:
@@ -576,12 +604,18 @@ def _near(base: SearchState, without: SearchState, state: SearchState, name: str
 
 
 def quieter(before: Split, after: Split) -> bool:
-    """Whether the noise of any channel has turned out to be clearly smaller."""
+    """Whether the noise of any channel has turned out to be clearly smaller, in all of a record or in parts of it."""
     return any(
-        n.innovation < QUIETER * o.innovation
+        n < QUIETER * o
         for new, old in zip(after.segments, before.segments, strict=True)
-        for n, o in zip(new.noise, old.noise, strict=True)
+        for n, o in zip(loud(new), loud(old), strict=True)
     )
+
+
+def loud(segments: Segments) -> Array:
+    """(C,) root mean square over the segments of what is new in each sample's noise [SI]."""
+    innovation = np.array([n.innovation for n in segments.noise])
+    return np.asarray(innovation * np.sqrt(np.mean(segments.loudness**2, axis=0)))
 
 
 def retimed(before: Split, after: Split) -> bool:
