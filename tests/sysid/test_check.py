@@ -303,9 +303,10 @@ def vague(result: dict) -> set[str]:
 
 def test_what_the_records_cannot_identify(model: Model, records: list[Record]) -> None:
     assert vague(check(model, records)) <= {"internal_leakage.coefficient"}
-    still = [recorded(model, "still", np.zeros(3000))]
-    assert vague(check(model, still)) >= {"valve_flow", "viscous_friction.coefficient", "moving_mass"}
-    assert vague(check(model, still, keys=["valve_flow"])) == {"valve_flow"}
+    even = load_model("sample_bench")  # with a rod on one side alone the piston creeps, and that shows something
+    still = [recorded(even, "still", np.zeros(3000))]
+    assert vague(check(even, still)) >= {"valve_flow", "viscous_friction.coefficient", "moving_mass"}
+    assert vague(check(even, still, keys=["valve_flow"])) == {"valve_flow"}
 
 
 def test_two_parameters_that_act_alike_are_named_together(model: Model, records: list[Record]) -> None:

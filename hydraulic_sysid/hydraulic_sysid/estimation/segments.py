@@ -39,7 +39,7 @@ _PRIOR = {"position": 1000.0, "pressure_a": 200.0, "pressure_b": 200.0}
 _UNMEASURED_PRESSURE = 0.2  # … before the piston has moved, when nothing has said anything yet, …
 _TRACKED_PRESSURE = 0.05  # … and later: as a land loses where its flow is off by a twentieth
 _FORGOTTEN = 0.5  # of the range of a record, after which such a pressure no longer depends on what it began with
-_VELOCITY = 0.2  # m/s
+_VELOCITY = 0.2  # m/s, where the piston moves
 _SETTLING = 0.1  # s of a record after which states that no sensor sees have forgotten what they began with
 _NUMERICAL = 1e-6  # of a channel's range: a noise-free record is not held to less
 _LEAST_NOISE = float(np.finfo(float).tiny) ** 0.5  # of a channel that stands still: its square must not vanish
@@ -167,12 +167,15 @@ class Segments:
 
     @cached_property
     def turning(self) -> Array:
-        """(S,) acceleration with which segments begin [m/s²] whose piston hardly moves there, NaN for the others."""
-        velocity = self.smoothed[:, _STATES.index("velocity")]
-        around = max(1, round(_TURNING / self.record.dt))
-        slope = savgol_filter(velocity, 2 * around + 1, 1, deriv=1, delta=self.record.dt)
-        found = slope[np.minimum(self.first + around, len(slope) - 1)]  # of what follows: before, it may have braked
-        return np.where(np.abs(velocity[self.first]) < STICK_SPEED, found, np.nan)
+        """(S,) acceleration with which segments begin [m/s²] whose piston hardly moves there, NaN for the others.
+
+        It is read from what follows, as before that the piston may have braked; 0 where it stays at rest.
+        """
+        velocity, ahead = self.smoothed[:, _STATES.index("velocity")], max(1, round(_TURNING / self.record.dt))
+        inside = np.minimum(self.first[:, None] + np.arange(2 * ahead + 1), len(velocity) - 1)
+        slow = np.abs(velocity[inside]) < STICK_SPEED
+        slope = np.polynomial.polynomial.polyfit(self.record.dt * np.arange(2 * ahead + 1), velocity[inside].T, 1)[1]
+        return np.where(slow[:, 0], np.where(slow.all(axis=1), 0.0, slope), np.nan)
 
     @property
     def tracked(self) -> list[int]:
@@ -251,9 +254,11 @@ def _cut(record: Record, hydraulic: bool, length: float, robust: bool, left_out:
     noise = tuple(ChannelNoise.white(_noise(signals[c], robust)) for c in channels)
     index = first[:, None] + np.arange(samples)
     measured = np.stack([record[c][index] for c in channels], axis=-1)
-    prior = {"velocity": _VELOCITY} | {c: _PRIOR[c] * n.std for c, n in zip(channels, noise, strict=True)}
-    free = np.arange(len(_STATES) if hydraulic else 2)
     smoothed = _smoothed(record, signals)
+    slow = np.abs(smoothed[first, _STATES.index("velocity")]) < STICK_SPEED
+    prior: dict[str, float | Array] = {c: _PRIOR[c] * n.std for c, n in zip(channels, noise, strict=True)}
+    prior["velocity"] = np.where(slow, STICK_SPEED, _VELOCITY)
+    free = np.arange(len(_STATES) if hydraulic else 2)
     unknown = np.where(_moved(smoothed[:, 0])[first], _TRACKED_PRESSURE, _UNMEASURED_PRESSURE)
     prior_std = np.stack([np.broadcast_to(prior.get(_STATES[k], unknown), first.shape) for k in free], axis=-1)
     return Segments(

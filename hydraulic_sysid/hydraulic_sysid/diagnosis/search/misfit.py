@@ -18,6 +18,7 @@ WORST = 0.05  # of all segments, at least one, that do not count for whether som
 BEST = 0.02  # of all segments, at least one, without which a reduction must be one, too
 UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
 LITTLE = 1.03  # residual over noise up to which nothing need be missing
+SMALL = 1.2  # mean square over noise that is not far off it
 SMALL_UNEXPLAINED = 0.4  # share of it that effects may leave where little was left before
 VISIBLE = 5e-4  # over all residuals, of their present variance: a smaller one is a matter of laws, not of effects
 

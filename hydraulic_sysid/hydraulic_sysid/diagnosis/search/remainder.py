@@ -10,6 +10,7 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 
 from .holdout import Split
+from .misfit import SMALL, Misfit
 
 NEGLIGIBLE = 0.005  # of the motion in a segment: no law of a library is that of a bench to five parts in a thousand
 
@@ -63,6 +64,11 @@ def remainders(split: Split, residual: Sequence[Array]) -> list[Remainder]:
 def negligible(found: list[Remainder], share: float = NEGLIGIBLE) -> bool:
     """Whether what is left is below what any law of a library leaves, or below another ``share`` of the motion."""
     return bool(found) and all(r.share < share for r in found)
+
+
+def unimportant(misfit: Misfit, found: list[Remainder]) -> bool:
+    """Whether nothing need be missing: what is left is near the noise, or not far off and nothing to anybody."""
+    return misfit.little or (misfit.usual <= SMALL and negligible(found))
 
 
 def spikes(split: Split) -> list[Spikes]:

@@ -34,7 +34,7 @@ from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material, misfit, unexplained
 from .recording_faults import RecordingFault, recording_faults, resized
-from .remainder import Remainder, Spikes, negligible, remainders, spikes
+from .remainder import Remainder, Spikes, negligible, remainders, spikes, unimportant
 from .score_test import CandidateScore, score
 from .spectral_lines import record_features
 from .whiteness import Whiteness, whiteness
@@ -228,8 +228,9 @@ class Search:
             if len(self.faults) == MOST_FAULTS or negligible(left, UNNOTICED):
                 break
             self.say("faults of the recording")
+            little = unimportant(base.misfit, left)
             # A disturbance is free enough to take up what laws leave, the timing of a channel is not.
-            faults = [f for f in recording_faults(base.linearisation) if not (f.linear and negligible(left))]
+            faults = [f for f in recording_faults(base.linearisation) if not (f.linear and little)]
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
                 break
@@ -356,7 +357,9 @@ class Search:
         if not scores:
             return base
         least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)
-        best = varied([s for s in scores if s.reduction > least], ALIKE if most < MOST_REFITS else most)[:most]
+        # What rounding explains shows once the initial states have settled with it.
+        worth = [s for s in scores if s.reduction > least or observed(s.effect)]
+        best = varied(worth, ALIKE if most < MOST_REFITS else most)[:most]
         refits = sorted((self.refit(base, s) for s in best), key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
 

@@ -15,9 +15,9 @@ from hydraulic_sysid.estimation.parameters import Parameters
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
 from .drive_faults import DriveHypothesis
-from .misfit import SMALL_UNEXPLAINED, UNSEEN, unexplained
+from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained
 from .nonparametric_curves import NonparametricCurve
-from .remainder import Remainder, negligible
+from .remainder import Remainder, unimportant
 from .search import SearchResult
 from .set_aside import SATURATED, SetAside
 from .whiteness import Whiteness
@@ -36,7 +36,6 @@ NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
 VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
-SMALL = 1.2  # mean square over noise below which a larger share may be left
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
 BELOW = 0.9  # residual over noise below which the noise model is doubted
@@ -118,7 +117,7 @@ def kind_of(result: SearchResult, tied: bool) -> str:
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added."""
     final = result.final.misfit
     left = unexplained(result.base.misfit, final)
-    little = final.little or (final.usual <= SMALL and negligible(result.remainders))
+    little = unimportant(final, result.remainders)
     if not result.added:
         if not little and left > UNEXPLAINED:
             return RECORDING if drive_unknown(result) else OUTSIDE
