@@ -32,9 +32,9 @@ from .errors import DiagnosisError
 from .frozen_jacobian import Refit, as_it_is, refit
 from .holdout import Split, split
 from .linearisation import Linearisation
-from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material, misfit, unexplained
+from .misfit import SMALL, SMALL_UNEXPLAINED, Misfit, explained, material, misfit, unexplained
 from .recording_faults import RecordingFault, recording_faults, resized
-from .remainder import Remainder, Spikes, negligible, remainders, spikes, unimportant
+from .remainder import Remainder, Spikes, negligible, remainders, spikes
 from .score_test import CandidateScore, score
 from .spectral_lines import record_features
 from .whiteness import Whiteness, whiteness
@@ -228,7 +228,7 @@ class Search:
             if len(self.faults) == MOST_FAULTS or negligible(left, UNNOTICED):
                 break
             self.say("faults of the recording")
-            little = unimportant(base.misfit, left)
+            little = base.misfit.usual <= SMALL and negligible(left)
             # A disturbance is free enough to take up what laws leave, the timing of a channel is not.
             faults = [f for f in recording_faults(base.linearisation) if not (f.linear and little)]
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
