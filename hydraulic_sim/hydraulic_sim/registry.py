@@ -129,7 +129,11 @@ def check_file(path: Path) -> None:
 
     :raises EffectError: it is not there, or its name cannot be an effect's.
     """
-    if not path.is_file():
+    try:
+        there = path.is_file()
+    except OSError as error:
+        raise EffectError(f"{str(path)[:200]}: an effect file with this name cannot be: {error.strerror}") from None
+    if not there:
         raise EffectError(f"{path}: there is no such effect file")
     if path.suffix != ".py":
         raise EffectError(f"{path}: an effect file is Python and ends in .py")

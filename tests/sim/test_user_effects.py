@@ -14,6 +14,7 @@ import pytest
 from hydraulic_sim import registry
 from hydraulic_sim.batch import scatter
 from hydraulic_sim.catalogue import describe
+from hydraulic_sim.errors import EffectError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_sim.plant import Plant
@@ -177,3 +178,8 @@ def test_a_damaged_cache_is_made_anew(workshop: Workshop) -> None:
     for text in workshop.cache.rglob("plant_*.py"):
         text.write_text("")
     assert result(workshop.start()) == pytest.approx(-6e-6, rel=1e-12)
+
+
+def test_a_name_that_no_file_can_have_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(EffectError, match="too long"):
+        registry.check_file(tmp_path / f"{300 * 'a'}.py")
