@@ -16,7 +16,7 @@ from .effect import arguments
 from .embedded import Embedded
 from .errors import SimulationError
 from .model import Model
-from .slots import PER_SAMPLE
+from .slots import PER_SAMPLE, SLOTS
 from .trajectory import PlantState, Trajectory
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
@@ -24,6 +24,7 @@ LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 FIT_STEP, FIT_REFINEMENT = 1e-3, 2.2  # half as fine: off by a hundredth of the sensors' noise on all benches tried
 FIRM = 5.0  # times the oil's natural frequency: a contact in which the supply leaves 1e-4 of the stroke at most
 HEAVY = 1e6
+_OF_FORCES = ("moving_mass", "drive_force", "bristle_length", "bristle_time")  # base parameters of forces alone
 _READINGS = 4  # of the outputs, the first: what sensors read
 FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
 MOST_HALVINGS = 6
@@ -94,6 +95,17 @@ class Plant:
         rate = rates.fastest(other._active, other._values(), self.model.kind)
         other.longest_step = rates.step(rate, FIT_STEP, self.refinement)
         return other
+
+    @property
+    def held_path(self) -> tuple[float | str, ...]:
+        """All that the pressures of a `held` plant follow from besides its record: effects and values.
+
+        Forces move nothing there, and what sensors read comes after.
+        """
+        acting = [e for e in self._active if SLOTS[e.slot].subsystem not in ("force", "sensor")]
+        keys = [k for k in self.layout.parameters if "." not in k and k not in _OF_FORCES]
+        keys += [f"{e.name}.{p.name}" for e in acting for p in e.parameters]
+        return (*(e.name for e in acting), *(self.value(k) for k in keys))
 
     @property
     def state_names(self) -> tuple[str, ...]:

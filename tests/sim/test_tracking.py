@@ -90,3 +90,23 @@ def test_a_stop_far_stiffer_than_the_oil_asks_for_no_short_steps_in_fits(bench: 
     assert Plant.for_fits(bench).value("end_stop.stiffness") == bench.value("end_stop.stiffness")
     free = light.with_entry("end_stop.stiffness", free=True)
     assert Plant.for_fits(free).value("end_stop.stiffness") == light.value("end_stop.stiffness")
+
+
+def test_a_held_plant_goes_the_same_path_whatever_its_forces(bench: Model) -> None:
+    one = Plant.for_fits(bench)
+    drive, seen, starts = slowly(Plant(bench))
+    smoothed = np.stack([seen[c] for c in SEEN], axis=-1)
+    smoothed[:, SEEN.index("pressure_a")] = np.nan
+
+    def pressures(plant: Plant) -> np.ndarray:
+        return plant.held().track(drive, DT, starts, smoothed)[0][:, 2]
+
+    for key in ("moving_mass", "coulomb_friction.level", "viscous_friction.coefficient", "bristle_length"):
+        other = one.with_parameters({key: 1.3 * one.value(key)})
+        assert other.held_path == one.held_path, key
+        assert np.allclose(pressures(other), pressures(one), rtol=1e-6), key
+    for key in ("valve_flow", "bulk_modulus", "internal_leakage.coefficient", "supply_pressure"):
+        other = one.with_parameters({key: 1.3 * one.value(key)})
+        assert other.held_path != one.held_path, key
+        assert not np.allclose(pressures(other), pressures(one), rtol=1e-6), key
+    assert Plant.for_fits(bench.with_effect("valve_deadband")).held_path != one.held_path

@@ -69,8 +69,8 @@ class Shooting:
     misfit: float = 1.0
 
     @cached_property
-    def _known(self) -> dict[tuple[int, tuple[float | str, ...]], Inner]:
-        """Inner states that follow from the drive alone, by record and path: most plants of a fit share them."""
+    def _known(self) -> dict[tuple[int, tuple[float | str, ...]], tuple[Array, Array]]:
+        """What was propagated along a record, by record and path: most plants of a fit share it."""
         return {}
 
     @cached_property
@@ -172,31 +172,30 @@ class Shooting:
         segments = self.segments[i]
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.record["drive"] if drive is None else drive
-        turning = segments.turning
-        run = plant.predict(drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, turning)
+        run = plant.predict(
+            drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, segments.turning
+        )
         return np.stack([run[c] for c in segments.channels], axis=-1)
 
     def _inner(self, plant: Plant, i: int) -> Inner:
         """States that no sensor sees, propagated along the record up to each segment."""
-        found, segments = self._driven_states(plant, i), self.segments[i]
-        if not segments.tracked:
-            return found
-        # The piston moves as it was seen to, whatever its forces.
-        values, _ = plant.held().track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
-        return replace(found, pressures=(segments.tracked, values))
+        found, segments = Inner([], np.empty(0), None), self.segments[i]
+        if plant.has_inner_states:
+            measured = segments.smoothed.shape[1]
+            columns = [k for k, name in enumerate(plant.state_names) if k >= measured and name != "stick"]
+            found = Inner(columns, *self._track(plant, i, plant.drive_path))
+        if segments.tracked:
+            # The piston moves as it was seen to, whatever its forces.
+            values, _ = self._track(plant.held(), i, ("held", *plant.held_path))
+            found = replace(found, pressures=(segments.tracked, values))
+        return found
 
-    def _driven_states(self, plant: Plant, i: int) -> Inner:
-        """Those that laws have of their own."""
-        if not plant.has_inner_states:
-            return Inner([], np.empty(0), None)
-        path = plant.drive_path
+    def _track(self, plant: Plant, i: int, path: tuple[float | str, ...] | None) -> tuple[Array, Array]:
+        """States and memories at each segment; those of another plant of the same ``path``, where there was one."""
         if path is not None and (i, path) in self._known:
             return self._known[i, path]
         segments = self.segments[i]
-        tracked, memories = plant.track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
-        measured = segments.smoothed.shape[1]
-        names = enumerate(plant.state_names)
-        found = Inner([k for k, name in names if k >= measured and name != "stick"], tracked, memories)
+        found = plant.track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
         if path is not None:
             if len(self._known) > _MOST_KNOWN:
                 self._known.clear()
