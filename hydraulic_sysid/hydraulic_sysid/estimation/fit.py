@@ -28,10 +28,9 @@ from .shooting import Shooting
 _SETTLED = 1e-4  # share of the cost below which moving initial states on gains no more
 _ROUNDS = 4  # times that they are moved at most
 _NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured pressures go further
-_OUTDATED = (
-    0.8  # of the sum of squares where the directions of the initial states were taken: below, they are taken anew
-)
-_OUTDATED_AT_END = 200.0  # least gains of a fit by which it has fallen, where a fit would end
+# Of the sum of squares where the directions of the initial states were taken: below, they are taken anew …
+_OUTDATED = 0.8
+_OUTDATED_AT_END = 200.0  # … and where a fit would end, if it has fallen by so many of its least gains
 _MILD = 3.0  # residual over noise from which a robust loss counts less than the square
 
 

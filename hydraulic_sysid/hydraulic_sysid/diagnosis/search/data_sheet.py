@@ -119,8 +119,8 @@ def as_filed(model: Model, filed: Model) -> Model:
     for key, own in model.entries.items():
         if key in filed.entries:
             free, bounds = filed.entries[key].free, filed.entries[key].bounds
-            beyond = bounds is not None and not bounds[0] <= own.value <= bounds[1]
-            model = model.with_entry(key, free=free, bounds=None if beyond else bounds)
+            outside = bounds is not None and not bounds[0] <= own.value <= bounds[1]
+            model = model.with_entry(key, free=free, bounds=None if outside else bounds)
     return model
 
 

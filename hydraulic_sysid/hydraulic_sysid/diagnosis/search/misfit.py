@@ -134,7 +134,7 @@ def explained(before: Misfit, after: Misfit) -> float:
     return gain / max(excess, 1e-9 * before.total, gain)
 
 
-def unexplained(before: Misfit, after: Misfit) -> float:
+def unexplained_share(before: Misfit, after: Misfit) -> float:
     """Mean square that is surely beyond the noise, over that before (0…1)."""
     first, last = (max(m.usual - 1.0 - UNSEEN, 0.0) for m in (before, after))
     return last / first if first > 0.0 else 0.0

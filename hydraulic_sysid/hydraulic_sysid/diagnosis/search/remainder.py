@@ -66,9 +66,9 @@ def negligible(found: list[Remainder], share: float = NEGLIGIBLE) -> bool:
     return bool(found) and all(r.share < share for r in found)
 
 
-def unimportant(misfit: Misfit, found: list[Remainder]) -> bool:
-    """Whether nothing need be missing: what is left is near the noise, or not far off and nothing to anybody."""
-    return misfit.little or (misfit.usual <= SMALL and negligible(found))
+def immaterial(misfit: Misfit, found: list[Remainder]) -> bool:
+    """Whether what is left is not far off the noise, and nothing to anybody."""
+    return misfit.usual <= SMALL and negligible(found)
 
 
 def spikes(split: Split) -> list[Spikes]:

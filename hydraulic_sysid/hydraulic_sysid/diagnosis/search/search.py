@@ -32,9 +32,9 @@ from .errors import DiagnosisError
 from .frozen_jacobian import Refit, as_it_is, refit
 from .holdout import Split, split
 from .linearisation import Linearisation
-from .misfit import SMALL, SMALL_UNEXPLAINED, Misfit, explained, material, misfit, unexplained
+from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material, misfit, unexplained_share
 from .recording_faults import RecordingFault, recording_faults, resized
-from .remainder import Remainder, Spikes, negligible, remainders, spikes
+from .remainder import Remainder, Spikes, immaterial, negligible, remainders, spikes
 from .score_test import CandidateScore, score
 from .spectral_lines import record_features
 from .whiteness import Whiteness, whiteness
@@ -228,9 +228,10 @@ class Search:
             if len(self.faults) == MOST_FAULTS or negligible(left, UNNOTICED):
                 break
             self.say("faults of the recording")
-            little = base.misfit.usual <= SMALL and negligible(left)
-            # A disturbance is free enough to take up what laws leave, the timing of a channel is not.
-            faults = [f for f in recording_faults(base.linearisation) if not (f.linear and little)]
+            faults = recording_faults(base.linearisation)
+            if immaterial(base.misfit, left):
+                # A disturbance is free enough to take up what laws leave, the timing of a channel is not.
+                faults = [f for f in faults if not f.linear]
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
                 break
@@ -360,7 +361,9 @@ class Search:
         # What rounding explains shows once the initial states have settled with it.
         worth = [s for s in scores if s.reduction > least or observed(s.effect)]
         best = varied(worth, ALIKE if most < MOST_REFITS else most)[:most]
-        refits = sorted((self.refit(base, s) for s in best), key=lambda r: r.misfit.total)
+        tried = [(self.refit(base, s), observed(s.effect)) for s in best]
+        refits = [r for r, seen in tried if not seen or base.misfit.total - r.misfit.total > least]
+        refits.sort(key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
 
     def refit(self, base: SearchState, candidate: CandidateScore) -> CandidateRefit:
@@ -519,7 +522,7 @@ def decisive(found: SearchResult) -> SearchResult:
     explains little and may as well be something of another subsystem: that is how far laws are off those of the bench.
     """
     base, final = found.base.misfit, found.final.misfit
-    if found.added and base.little and unexplained(base, final) > SMALL_UNEXPLAINED:
+    if found.added and base.little and unexplained_share(base, final) > SMALL_UNEXPLAINED:
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
         if vague(found, name):

@@ -15,9 +15,9 @@ from hydraulic_sysid.estimation.parameters import Parameters
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
 from .drive_faults import DriveHypothesis
-from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained
+from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
-from .remainder import Remainder, unimportant
+from .remainder import Remainder, immaterial
 from .search import SearchResult
 from .set_aside import SATURATED, SetAside
 from .whiteness import Whiteness
@@ -116,8 +116,8 @@ def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dic
 def kind_of(result: SearchResult, tied: bool) -> str:
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added."""
     final = result.final.misfit
-    left = unexplained(result.base.misfit, final)
-    little = unimportant(final, result.remainders)
+    left = unexplained_share(result.base.misfit, final)
+    little = final.little or immaterial(final, result.remainders)
     if not result.added:
         if not little and left > UNEXPLAINED:
             return RECORDING if drive_unknown(result) else OUTSIDE
