@@ -38,12 +38,12 @@ QUIETLY = ("--ros-args", "--log-level", "error")
 def source() -> None:
     """Answer every state with a drive towards the middle of the stroke, until standard input closes."""
     import rclpy
-    from rclpy.executors import SingleThreadedExecutor
     from rclpy.signals import SignalHandlerOptions
 
     from hydraulic_interfaces.contract import topic
     from hydraulic_interfaces.conversions import CommandEncoder, from_time, interface_class
     from hydraulic_interfaces.qos import profile
+    from node_timing import spin
 
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node, joints = rclpy.create_node("emergency_stop_source"), interface_class("sensor_msgs/msg/JointState")
@@ -53,12 +53,7 @@ def source() -> None:
         publisher.publish(encode(from_time(state.header.stamp), -DRIVE_V if state.position[0] > 0.0 else DRIVE_V))
 
     node.create_subscription(joints, topic("state"), answer, profile("state", 10))
-    ended = threading.Event()
-    threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    while not ended.is_set():
-        executor.spin_once(timeout_sec=0.1)
+    spin(node)
 
 
 class Stopper:

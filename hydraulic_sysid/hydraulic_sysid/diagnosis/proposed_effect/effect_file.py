@@ -14,15 +14,10 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.effect import Effect
+from hydraulic_sysid.data.display import UNITS
 
 from .laws import FittedLaw
 
-VARIABLE_UNITS = {
-    "position": "m", "reading": "m", "velocity": "m/s", "speed": "m/s", "time": "s", "opening": "1",
-    "size_of_opening": "1", "pressure_a": "Pa", "pressure_b": "Pa", "mean_pressure": "Pa", "pressure_difference": "Pa",
-    "size_of_pressure_difference": "Pa", "valve_drop": "Pa",
-}  # fmt: skip
-"""Variable of a curve → SI unit."""
 EXPRESSIONS = {
     "time": "t",
     "speed": "abs(velocity)",
@@ -54,7 +49,7 @@ def effect_text(
     returns = place["RETURNS"] if isinstance(place["RETURNS"], str) else place["RETURNS"][variable]
     z = place.get("EXPRESSIONS", {}).get(variable) or EXPRESSIONS.get(variable, variable)
     words = variable.replace("_", " ")
-    law, unit, own = fitted.law, effect.parameters[0].unit, VARIABLE_UNITS[variable]
+    law, unit, own = fitted.law, effect.parameters[0].unit, UNITS.get(variable, "1")
     signals = _names(z) | _names(returns) - {"law"}
     arguments = [*sorted(signals), *law.coefficients, *law.shapes]
     source = f"proposed by diagnose from {named(records)}"

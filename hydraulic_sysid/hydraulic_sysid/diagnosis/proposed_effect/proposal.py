@@ -25,6 +25,7 @@ from hydraulic_sysid.diagnosis.search.nonparametric import FILES
 from hydraulic_sysid.diagnosis.search.nonparametric_curves import (
     NonparametricCurve,
     Place,
+    curve_between,
     curve_normal,
     places,
     unexplained,
@@ -164,13 +165,10 @@ def _candidates(
 
 
 def _candidate(part: Linearisation, place: Place, number: int) -> _Candidate | None:
-    low, high = _extent(place.values)
-    if not high - low > 1e-9 * max(abs(low), abs(high), 1e-12):
+    laid = curve_between(part, place, *_extent(place.values), number)
+    if laid is None:
         return None
-    knots: Array = np.linspace(low, high, number, dtype=np.float64)
-    normal = curve_normal(part, place, knots)
-    if normal is None:
-        return None
+    knots, normal = laid
     fitted = best_law(_equations(part, place, normal, knots, _cost(part)), short=number == PERIODIC)
     return None if fitted is None else _Candidate(place, knots, _in_units(fitted, place))
 

@@ -121,6 +121,17 @@ def curve_normal(at: Linearisation, place: Place, knots: Array) -> NormalEquatio
     return at.bordered([c[..., 1:] - c[..., :1] for c in changed]).marginal(len(at.parameters))
 
 
+def curve_between(
+    at: Linearisation, place: Place, low: float, high: float, number: int
+) -> tuple[Array, NormalEquations] | None:
+    """So many knots between two values of the variable, and `curve_normal` there; None where there is no range."""
+    if not high - low > 1e-9 * max(abs(low), abs(high), 1e-12):
+        return None
+    knots: Array = np.linspace(low, high, number, dtype=np.float64)
+    normal = curve_normal(at, place, knots)
+    return None if normal is None else (knots, normal)
+
+
 def unexplained(at: Linearisation) -> float:
     """The sum of squares that noise does not explain."""
     noise = sum(float(r.size) - s.free.size * len(s) for r, s in zip(at.residual, at.split.segments, strict=True))
@@ -152,12 +163,10 @@ def _seen(at: Linearisation) -> dict[str, Array]:
 
 def _curve(at: Linearisation, place: Place) -> NonparametricCurve | None:
     low, high = (float(np.quantile(place.values, q)) for q in _RANGE)
-    if not high - low > 1e-9 * max(abs(low), abs(high), 1e-12):
+    laid = curve_between(at, place, low, high, KNOTS)
+    if laid is None:
         return None
-    knots: Array = np.linspace(low, high, KNOTS, dtype=np.float64)
-    normal = curve_normal(at, place, knots)
-    if normal is None:
-        return None
+    knots, normal = laid
     visited = np.diag(normal.information)
     ridge = _RIDGE * float(visited.max())
     if not ridge > 0.0:
