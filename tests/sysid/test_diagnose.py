@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -200,6 +202,14 @@ def test_a_small_further_effect_that_may_be_anything_is_not_named(
     assert kept.added == ["stribeck_friction", "external_leakage"][: 1 + named]
     assert kept.final is (final if named else before)
     assert kept.misfits[kept.added[-1]] == kept.final.misfit
+
+
+def test_what_a_fault_of_the_recording_explains_is_explained(model) -> None:
+    base = state(model, 3000 * 1.04, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
+    assert found.before is base.misfit and found.unexplained_share == pytest.approx(1.0)
+    found = replace(found, as_recorded=at(3000 * 5.0))
+    assert found.before is found.as_recorded and found.unexplained_share < 0.01
 
 
 def test_a_fit_with_a_number_at_its_bound_is_also_begun_beyond_it(model) -> None:

@@ -13,7 +13,7 @@ from hydraulic_sysid.diagnosis.compare.document import model_document
 from . import verdict as verdicts
 from .candidates import subsystem
 from .holdout import BLOCK, EVERY
-from .misfit import UNSEEN, Misfit, unexplained_share
+from .misfit import UNSEEN, Misfit
 from .nonparametric_curves import NonparametricCurve
 from .search import SearchResult
 from .uncertainty import Known
@@ -134,7 +134,7 @@ def document(
             for r in result.remainders
         ],
         "parameters": _parameters(final.model, known, final.linearisation.parameters.keys),
-        "unexplained_share": unexplained_share(result.base.misfit, result.final.misfit),
+        "unexplained_share": result.unexplained_share,
         "nonparametric_curves": [_curve(c) for c in curves],
         "nearest_effects": [r.name for r in final.refits[:_NEAREST]] if outside else [],
         "proposed_effect": None,

@@ -145,6 +145,11 @@ class SearchResult:
         return self.as_recorded or self.base.misfit
 
     @property
+    def unexplained_share(self) -> float:
+        """What is left in the end, of what was there before anything was explained (0…1)."""
+        return unexplained_share(self.before, self.final.misfit)
+
+    @property
     def added(self) -> list[str]:
         """Effects, the one that explains most first."""
         return list(self.misfits)
