@@ -227,6 +227,17 @@ def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:
     assert Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0).sure
 
 
+def test_numbers_that_explain_the_same_are_all_named(model) -> None:
+    other = Deviation("piston_area_b", 2.1e-3, 2.12e-3, 1e-5, 900.0)
+    deviation = Deviation("piston_area_a", 3.12e-3, 3.09e-3, 1e-5, 1000.0, alternatives=(other,))
+    base = state(model, 3000 * 1.04, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {}, moved=[deviation])
+    assert verdict.data_sheet_sentences(found) == [
+        "piston_area_a is 30.9 ± 0.1 cm², not the 31.2 cm² of the model file, "
+        "or piston_area_b is 21.2 ± 0.1 cm², not the 21 cm² of the model file: these data cannot distinguish them."
+    ]
+
+
 @pytest.mark.parametrize(
     ("own", "other", "final", "alone"),
     [

@@ -86,6 +86,7 @@ NUMBER = {
     "standard_error": 1e4,
     "chi_square_difference": 4e3,
     "instead": ["backlash"],
+    "alternatives": [{"key": "piston_area_a"}],
 }
 CONTRADICTION = {"severity": "contradiction", "text": "The travel is too long.", "remedy": "Mend the stroke."}
 DATA_SHEET = {"data_sheet": [NUMBER]}
@@ -131,7 +132,7 @@ PROPOSED = {
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
         ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
         ("complete", {"check": [CONTRADICTION]}, "First: The travel is too long. Mend the stroke."),
-        ("data sheet", DATA_SHEET, "Ask for the true supply_pressure; 158.1; backlash"),
+        ("data sheet", DATA_SHEET, "Ask for the true supply_pressure; 158.1; backlash, piston_area_a"),
         ("recording", RECORDING, "The drive was late: mend it.; Look for a loose contact; Spikes in pressure"),
     ],
 )

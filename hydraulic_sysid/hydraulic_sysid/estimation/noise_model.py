@@ -23,7 +23,7 @@ from scipy.stats import gamma
 
 from hydraulic_sim.arrays import Array, Mask
 
-from .jit import jit
+from .whitened_residual import whitened
 
 ORDER = 12  # of the autoregression: two second-order filters and what hum and rounding add
 WINDOW = 128  # samples of a periodogram
@@ -67,21 +67,27 @@ class ChannelNoise:
         return len(self.coefficients) - 1
 
     @cached_property
+    def filter(self) -> Array:
+        """(p + 1,) what makes innovations of unit variance of noise."""
+        return self.coefficients / self.innovation
+
+    @cached_property
+    def head(self) -> Array:
+        """(p, p) the same of its first p samples: the inverse of the Cholesky factor of their covariance."""
+        if not self.order:
+            return np.zeros((0, 0))
+        return np.ascontiguousarray(solve_triangular(self._root, np.eye(self.order), lower=True))
+
+    @cached_property
     def _root(self) -> Array:
         """Cholesky factor of the covariance of the first p samples."""
         return np.linalg.cholesky(toeplitz(self.autocovariance[: self.order]))
 
     def whiten(self, values: Array) -> Array:
         """(S, n, …) along the second axis, n > p: unit variance and no colour where ``values`` are this noise."""
-        if not self.order:
-            return values / self.innovation
         width = int(np.prod(values.shape[2:]))
         rows = np.ascontiguousarray(values, dtype=float).reshape(len(values), -1)
-        white = _moving_average(rows, width, self.coefficients / self.innovation).reshape(values.shape)
-        head = np.moveaxis(values[:, : self.order], 1, 0)
-        first = solve_triangular(self._root, head.reshape(self.order, -1), lower=True)
-        white[:, : self.order] = np.moveaxis(first.reshape(head.shape), 0, 1)
-        return white
+        return np.asarray(whitened(rows, width, self.filter, self.head)).reshape(values.shape)
 
     def missing(self, outliers: Mask) -> list[tuple[int, Array]]:
         """What samples that do not count (S, n) could change: rows, and orthonormal whitened columns (n, G) of each."""
@@ -104,17 +110,6 @@ class ChannelNoise:
         begin = -values[:, p - 1 :: -1][:, :p] @ hankel(self.coefficients[1:])  # what the filter remembers
         values[:, p:], _ = lfilter([self.innovation], self.coefficients, white[:, p:], axis=1, zi=begin)
         return values
-
-
-@jit
-def _moving_average(values: Array, width: int, coefficients: Array) -> Array:
-    """Σ_l c_l·x_{t−l} of values (S, n·width), n samples side by side; what is before the first is 0."""
-    found = coefficients[0] * values
-    for s in range(values.shape[0]):
-        for lag in range(1, coefficients.size):
-            for i in range(lag * width, values.shape[1]):
-                found[s, i] += coefficients[lag] * values[s, i - lag * width]
-    return found
 
 
 def estimate(residuals: Sequence[Array], dt: float, order: int = ORDER) -> ChannelNoise:

@@ -24,6 +24,7 @@ from .noise_model import ChannelNoise
 from .recording import Timing
 from .saturation import runs
 from .velocity_filter import VelocityFilter
+from .whitened_residual import residual
 
 MEASURED = ("position", "pressure_a", "pressure_b")
 """Channels that are fitted, where a record has them."""
@@ -106,6 +107,17 @@ class Segments:
     def _missing(self) -> list[list[tuple[int, Array]]]:
         return [noise.missing(self.outliers[:, :, c]) for c, noise in enumerate(self.noise)]
 
+    @cached_property
+    def _reading(self) -> tuple[Array, ...]:
+        """How each channel is read and whitened, as `whitened_residual.residual` takes it."""
+        orders = np.array([n.order for n in self.noise])
+        coefficients = np.zeros((len(orders), orders.max() + 1))
+        heads = np.zeros((len(orders), orders.max(), orders.max()))
+        for c, (noise, p) in enumerate(zip(self.noise, orders.tolist(), strict=True)):
+            coefficients[c, : p + 1], heads[c, :p, :p] = noise.filter, noise.head
+        delays, lags = np.array([(t.delay, t.lag) for t in self.timing]).T.copy() / self.record.dt
+        return self.outliers, delays, lags, orders, coefficients, heads, np.ascontiguousarray(self.loudness)
+
     @property
     def counted(self) -> Index:
         """(S,) how many measured values count in each segment."""
@@ -116,7 +128,11 @@ class Segments:
 
         The ``priors`` of the initial states, or residuals that end with them, are appended.
         """
-        left = self.whitened(self.measured - self.recorded(run))
+        left = np.asarray(residual(self.measured, run, *self._reading))
+        for c in range(len(self.channels)):
+            for row, basis in self._missing[c]:
+                own = left[row, c :: len(self.channels)]
+                own -= basis @ (basis.T @ own)
         return np.concatenate((left, priors[:, -len(self.free) :]), axis=1)
 
     def recorded(self, run: Array) -> Array:

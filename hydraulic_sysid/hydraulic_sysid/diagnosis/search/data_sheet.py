@@ -7,8 +7,9 @@ that have to move are named, by the cost of holding the others.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from hydraulic_sysid.estimation.covariance import inverse
 from hydraulic_sysid.estimation.parameters import Priors
 
 from .linearisation import Linearisation
+from .uncertainty import Known
 
 TOLERANCES = {"Pa": 0.06, "m^2": 0.04, "m^3": 0.5, "kg": 1.0, "m^3/s": 1.0}
 """Share by which a number of this unit may be off where its file gives no bounds."""
@@ -32,7 +34,7 @@ VISIBLE = 0.01  # … at least this share of the number of residuals
 class Deviation:
     """A number of the model file that the records contradict [SI]; ``cost``: sum of squares that keeping it costs.
 
-    ``instead``: effects that would explain the same.
+    ``instead``: effects, and ``alternatives``: other numbers, that would explain the same.
     """
 
     key: str
@@ -41,11 +43,18 @@ class Deviation:
     standard_error: float
     cost: float
     instead: tuple[str, ...] = ()
+    alternatives: tuple[Deviation, ...] = ()
 
     @property
     def sure(self) -> bool:
         """Whether it is another number than that of the model file, beyond its error."""
         return abs(self.value - self.nominal) > SURE * self.standard_error
+
+
+def with_error(deviation: Deviation, known: Mapping[str, Known]) -> Deviation:
+    """With the standard error that the parameters have, where the records determine the number."""
+    error = known[deviation.key].standard_error
+    return replace(deviation, standard_error=error) if math.isfinite(error) else deviation
 
 
 def relaxed(model: Model) -> Model:

@@ -17,7 +17,7 @@ from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locat
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
-from .data_sheet import Deviation, as_filed
+from .data_sheet import as_filed, with_error
 from .document import document, with_balances
 from .linearisation import Linearisation
 from .misfit import explained
@@ -110,12 +110,6 @@ def diagnose(
     rows, where = _balances(before, records, before is suspected)
     rows_after, where_after = _balances(after, records, after is suspected) if after else ([], [])
     return Diagnosis(done, competing, with_balances(whole, rows, rows_after, where or where_after), remaining)
-
-
-def with_error(deviation: Deviation, known: Mapping[str, Known]) -> Deviation:
-    """With the standard error that the parameters have, where the records determine the number."""
-    error = known[deviation.key].standard_error
-    return replace(deviation, standard_error=error) if math.isfinite(error) else deviation
 
 
 def finished(found: SearchResult, known: Mapping[str, Known]) -> Model:

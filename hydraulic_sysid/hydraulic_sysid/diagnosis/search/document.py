@@ -12,6 +12,7 @@ from hydraulic_sysid.diagnosis.compare.document import model_document
 
 from . import verdict as verdicts
 from .candidates import subsystem
+from .data_sheet import Deviation
 from .holdout import BLOCK, EVERY
 from .misfit import UNSEEN, Misfit
 from .nonparametric_curves import NonparametricCurve
@@ -88,18 +89,7 @@ def document(
             ]
             for name, every in verdict.competing.items()
         },
-        "data_sheet": [
-            {
-                "key": d.key,
-                "unit": result.model.parameter(d.key).unit,
-                "nominal": d.nominal,
-                "value": d.value,
-                "standard_error": d.standard_error,
-                "chi_square_difference": d.cost,
-                "instead": list(d.instead),
-            }
-            for d in result.moved
-        ],
+        "data_sheet": [_number(result, d) for d in result.moved],
         "recording": {
             "faults": [
                 {
@@ -180,6 +170,19 @@ def with_balances(
 
 def _residual(misfit: Misfit) -> dict[str, float]:
     return {"fit": misfit.rms_fit, "validation": misfit.rms_validation}
+
+
+def _number(result: SearchResult, d: Deviation) -> dict[str, Any]:
+    return {
+        "key": d.key,
+        "unit": result.model.parameter(d.key).unit,
+        "nominal": d.nominal,
+        "value": d.value,
+        "standard_error": d.standard_error,
+        "chi_square_difference": d.cost,
+        "instead": list(d.instead),
+        "alternatives": [_number(result, other) for other in d.alternatives],
+    }
 
 
 def _effects(result: SearchResult, verdict: Verdict, known: Mapping[str, Known]) -> list[dict[str, Any]]:

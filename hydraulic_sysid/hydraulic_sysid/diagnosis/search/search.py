@@ -26,7 +26,7 @@ from hydraulic_sysid.estimation.segments import Segments
 
 from .candidates import candidates, observed, subsystem
 from .competing_models import competing_models
-from .data_sheet import Deviation, beyond, priors, relaxed, restored, significant, suspects
+from .data_sheet import Deviation, beyond, priors, relaxed, restored, significant, suspects, with_error
 from .drive_faults import costs_with
 from .errors import DiagnosisError
 from .frozen_jacobian import Refit, as_it_is, refit
@@ -37,6 +37,7 @@ from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import Remainder, Spikes, immaterial, negligible, remainders, spikes
 from .score_test import CandidateScore, score
 from .spectral_lines import record_features
+from .uncertainty import parameter_errors
 from .whiteness import Whiteness, whiteness
 
 PROMISING = 0.04  # of the best predicted reduction, from which a candidate is refitted
@@ -300,11 +301,14 @@ class Search:
             for suspect in [p for p in promising if p.cost >= PROMISED * promising[0].cost]:
                 self.say(f"fitting with another {suspect.key}")
                 state = self.state(restored(final.model, self.given, [*named, suspect.key]), self._last)
-                tried.append((state, replace(suspect, cost=done.misfit.total - state.misfit.total)))
+                cost, value = done.misfit.total - state.misfit.total, state.model.value(suspect.key)
+                tried.append((state, replace(suspect, cost=cost, value=value)))
             best, deviation = min(tried, key=lambda t: t[0].misfit.total, default=(done, None))
             if deviation is None or not significant(deviation.cost, best.misfit.count, best.misfit.variance):
                 break
-            deviation = replace(deviation, value=best.model.value(deviation.key))
+            tied = [(s, d) for s, d in tried if d is not deviation and not _worse(s.misfit, best.misfit)]
+            others = tuple(with_error(d, parameter_errors(s.linearisation)) for s, d in tied)
+            deviation = replace(deviation, alternatives=others)
             if deviation.sure:
                 moved, done = [*moved, deviation], best
                 continue
@@ -337,7 +341,7 @@ class Search:
                 reached = self.state(r.refit.model, self._last).misfit
             except SimulationError:
                 continue
-            if not significant(reached.total - done.misfit.total, reached.count, reached.variance):
+            if not _worse(reached, done.misfit):
                 found.append(r.name)
         return tuple(found)
 
@@ -549,6 +553,11 @@ def vague(found: SearchResult, name: str) -> bool:
     others = [c.name for c in competing_models(name, without, final) if not c.distinguishable]
     own = subsystem(library[name])
     return share < SUBORDINATE and any(subsystem(library[other]) != own for other in others)
+
+
+def _worse(misfit: Misfit, best: Misfit) -> bool:
+    """Whether a model is significantly worse than another."""
+    return significant(misfit.total - best.total, misfit.count, misfit.variance)
 
 
 def together(faults: Sequence[RecordingFault], found: RecordingFault) -> list[RecordingFault]:

@@ -14,6 +14,7 @@ from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
+from .data_sheet import Deviation
 from .drive_faults import DriveHypothesis
 from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
@@ -228,13 +229,22 @@ def data_sheet_sentences(result: SearchResult) -> list[str]:
     """What to correct in the model file, and what could be meant instead."""
     found = []
     for d in result.moved:
-        unit = result.model.parameter(d.key).unit
-        bounds = result.model.entry(d.key).bounds if result.model.entry(d.key).free else None
-        said = f"the {quantity(d.nominal, unit)} of the model file"
-        said = f"beyond its bound of {quantity(d.nominal, unit)}" if bounds else f"not {said}"
-        other = f" {_and(d.instead)} would explain the same: these data cannot distinguish them." if d.instead else ""
-        found.append(f"{d.key} is {quantity(d.value, unit, 4, error=d.standard_error)}, {said}.{other}")
+        said = ", or ".join(_deviation(result, one) for one in (d, *d.alternatives))
+        tied = ": these data cannot distinguish them"
+        if d.instead:
+            said += f". {_and(d.instead)} would explain the same{tied}"
+        elif d.alternatives:
+            said += tied
+        found.append(f"{said}.")
     return found
+
+
+def _deviation(result: SearchResult, d: Deviation) -> str:
+    unit, entry = result.model.parameter(d.key).unit, result.model.entry(d.key)
+    nominal = quantity(d.nominal, unit)
+    at_bound = entry.free and entry.bounds is not None
+    said = f"beyond its bound of {nominal}" if at_bound else f"not the {nominal} of the model file"
+    return f"{d.key} is {quantity(d.value, unit, 4, error=d.standard_error)}, {said}"
 
 
 def recording_sentences(result: SearchResult) -> list[str]:
