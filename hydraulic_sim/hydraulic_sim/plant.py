@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from . import base, rates
 from .arrays import Array
 from .compiled import compiled
-from .effect import arguments
+from .effect import Effect, arguments
 from .embedded import Embedded
 from .errors import SimulationError
 from .model import Model
@@ -56,7 +56,7 @@ class Plant:
         self._remembers = any(layout.library[name].slot == "command" for name in active)
         self._active = tuple(layout.library[name] for name in active)
         values = self._values()
-        self.refinement = refinement
+        self.refinement, self._allowed_step = refinement, longest_step
         self.longest_step = rates.step(rates.fastest(self._active, values, model.kind), longest_step, refinement)
         self._shortest_dt = rates.shortest_sampling(self._active, values)
 
@@ -93,8 +93,13 @@ class Plant:
         """This plant with a piston so heavy that no force moves it within a few samples: it goes where it was seen."""
         other = self.with_parameters({"moving_mass": HEAVY * self.value("moving_mass")})
         rate = rates.fastest(other._active, other._values(), self.model.kind)
-        other.longest_step = rates.step(rate, FIT_STEP, self.refinement)
+        other.longest_step = rates.step(rate, self._allowed_step, self.refinement)
         return other
+
+    @property
+    def path(self) -> tuple[float | str, ...]:
+        """All that a plant's motion follows from besides the drive: effects and values."""
+        return (*(e.name for e in self._active), *self._parameters.tolist())
 
     @property
     def held_path(self) -> tuple[float | str, ...]:
@@ -258,13 +263,28 @@ class Plant:
         """Whether an effect that is on has states of its own, which no sensor sees, or never forgets a drive."""
         return any(e.states or (e.slot == "command" and e.memory and e.reach is None) for e in self._active)
 
+    def driven(self) -> Plant:
+        """This plant without all that its `drive_path` has nothing to do with: `track` is faster there."""
+        other, inner = copy.copy(self), self._inner_effects
+        other._on = np.zeros_like(self._on)
+        for e in inner:
+            other._on[self.layout.effects[e.name]] = 1
+        other._hydraulic = np.uint8(0)
+        rate = rates.fastest(inner, self._values(), "mechanical")
+        other.longest_step = max(self.longest_step, rates.step(rate, self._allowed_step, self.refinement))
+        return other
+
+    @property
+    def _inner_effects(self) -> list[Effect]:
+        return [e for e in self._active if e.states or e.slot == "command"]
+
     @property
     def drive_path(self) -> tuple[float | str, ...] | None:
         """All that inner states follow from besides the drive: effects and values; None where the motion matters too.
 
         Plants of one library with the same path propagate a record to the same inner states.
         """
-        inner = [e for e in self._active if e.states or e.slot == "command"]
+        inner = self._inner_effects
         alone = {"command", "t", *PER_SAMPLE}
         for e in inner:
             own = {p.name for p in e.parameters} | {s.name for s in e.states}

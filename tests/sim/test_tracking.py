@@ -43,7 +43,7 @@ def test_what_forgets_soon_needs_no_leading(bench: Model) -> None:
     assert not Plant(bench.with_effect("sensor_backlash")).has_inner_states
 
 
-@pytest.mark.parametrize("effect", ["spool_dynamics", "spool_rate_limit"])
+@pytest.mark.parametrize("effect", ["spool_dynamics", "spool_rate_limit", "valve_hysteresis"])
 def test_states_that_follow_from_the_drive_alone_are_those_of_any_plant_with_the_same_valve(
     bench: Model, effect: str
 ) -> None:
@@ -55,6 +55,9 @@ def test_states_that_follow_from_the_drive_alone_are_those_of_any_plant_with_the
     inner = [k for k, name in enumerate(one.state_names) if name not in (*SEEN, "stick")]
     (mine, memories), (others, other_memories) = (p.track(drive, DT, starts, smoothed) for p in (one, other))
     assert inner and np.array_equal(mine[:, inner], others[:, inner]) and np.array_equal(memories, other_memories)
+    alone, alone_memories = one.driven().track(drive, DT, starts, smoothed)
+    assert np.allclose(alone[:, inner], mine[:, inner], rtol=0.0, atol=1e-6)
+    assert np.array_equal(alone_memories, memories)
     parameter = next(p.name for p in bench.library[effect].parameters)
     moved = one.with_parameters({f"{effect}.{parameter}": 1.1 * one.value(f"{effect}.{parameter}")})
     assert moved.drive_path != one.drive_path

@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import Plant
 
 from .parameters import Parameters
@@ -21,6 +22,7 @@ from .segments import Segments
 T = TypeVar("T")
 
 _MOST_KNOWN = 256  # propagations along a record that are kept
+_STIFFEST = 10.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
 _STEP = 2e-3  # difference step of a parameter, of its value, …
 _LEAST_STEP = 0.1  # … or of so much of its scale
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel
@@ -78,6 +80,18 @@ class Shooting:
         """As the records show them."""
         return [s.initial_states(self.plant) for s in self.segments]
 
+    def try_out(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
+        """The `residuals` of another plant.
+
+        :raises hydraulic_sim.errors.SimulationError: it does not run, or is so stiff that fits stay away from it.
+        """
+        if plant.longest_step * _STIFFEST < self.plant.longest_step:
+            raise SimulationError(
+                f"{plant.model.name!r}: the physics asks for steps of {plant.longest_step:.2g} s, at the beginning of "
+                f"the fit for {self.plant.longest_step:.2g} s"
+            )
+        return self.residuals(plant, initial_states)
+
     def residuals(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
         """(S, m) per record: measured − simulated over the noise, the priors of the initial states appended."""
         return self._map(lambda i: self._residual(plant, i, initial_states[i]), range(len(self.segments)))
@@ -103,7 +117,7 @@ class Shooting:
 
     def better(self, plant: Plant, one: Sequence[Array], other: Sequence[Array]) -> tuple[list[Array], list[Array]]:
         """Of two initial states of every segment those that leave less, and their residuals (S, m)."""
-        return self._better((one, self.residuals(plant, one)), (other, self.residuals(plant, other)))
+        return self._better((one, self.try_out(plant, one)), (other, self.residuals(plant, other)))
 
     def _better(
         self, one: tuple[Sequence[Array], Sequence[Array]], other: tuple[Sequence[Array], Sequence[Array]]
@@ -183,24 +197,24 @@ class Shooting:
         if plant.has_inner_states:
             measured = segments.smoothed.shape[1]
             columns = [k for k, name in enumerate(plant.state_names) if k >= measured and name != "stick"]
-            found = Inner(columns, *self._track(plant, i, plant.drive_path))
+            path = plant.drive_path
+            found = Inner(columns, *self._track(plant if path is None else plant.driven(), i, path or plant.path))
         if segments.tracked:
             # The piston moves as it was seen to, whatever its forces.
             values, _ = self._track(plant.held(), i, ("held", *plant.held_path))
             found = replace(found, pressures=(segments.tracked, values))
         return found
 
-    def _track(self, plant: Plant, i: int, path: tuple[float | str, ...] | None) -> tuple[Array, Array]:
+    def _track(self, plant: Plant, i: int, path: tuple[float | str, ...]) -> tuple[Array, Array]:
         """States and memories at each segment; those of another plant of the same ``path``, where there was one."""
-        if path is not None and (i, path) in self._known:
-            return self._known[i, path]
-        segments = self.segments[i]
-        found = plant.track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
-        if path is not None:
+        known = self._known.get((i, path))
+        if known is None:
             if len(self._known) > _MOST_KNOWN:
                 self._known.clear()
-            self._known[i, path] = found
-        return found
+            segments = self.segments[i]
+            known = plant.track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
+            self._known[i, path] = known
+        return known
 
     def _projection(self, plant: Plant, i: int, states: Array) -> Projection:
         segments, inner = self.segments[i], self._inner(plant, i)

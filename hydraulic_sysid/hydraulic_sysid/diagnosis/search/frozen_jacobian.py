@@ -106,7 +106,7 @@ class FrozenPoint:
         """None where the plant does not run."""
         located = plant.with_parameters(parameters.by_key)
         try:
-            raw = linearisation.point.shooting.residuals(located, initial_states)
+            raw = linearisation.point.shooting.try_out(located, initial_states)
         except SimulationError:
             return None
         bounded = all((np.abs(r) < _ENDLESS).all() for r in raw)

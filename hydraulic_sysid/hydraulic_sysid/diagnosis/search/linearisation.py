@@ -87,7 +87,7 @@ class Linearisation:
 
         :raises hydraulic_sim.errors.SimulationError: a plant does not run from these initial states.
         """
-        runs = [self.point.shooting.residuals(plant, self.point.initial_states) for plant in plants]
+        runs = [self.point.shooting.try_out(plant, self.point.initial_states) for plant in plants]
         return [np.stack([run[i] - p.raw for run in runs], axis=-1) for i, p in enumerate(self.point.projections)]
 
     def sample(self, most: int) -> tuple[Linearisation, float]:
