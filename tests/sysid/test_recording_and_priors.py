@@ -182,3 +182,20 @@ def test_more_of_a_fault_that_was_found_before_is_one_fault() -> None:
     late = RecordingFault(other, 2e-3, 1e-4, 50.0)
     assert together([first, late], more) == [late, RecordingFault(low_pass, 5e-3, 2e-4, 110.0)]
     assert together([first], late) == [first, late]
+
+
+def test_the_residual_of_a_run_is_that_of_its_parts() -> None:
+    """Compiled in one pass: what is recorded of the run, taken off, whitened, without samples that do not count."""
+    draw = np.random.default_rng(4)
+    channels = {c: draw.standard_normal(1000).cumsum() for c in ("drive", "position", "pressure_a", "pressure_b")}
+    (segments,) = cut([Record.sampled("r", DT, channels)], "hydraulic", 0.2)
+    noise = [ChannelNoise(np.array([1.0, -0.5]), 0.3, np.array([0.12, 0.06])), *segments.noise[1:]]
+    outliers = np.zeros_like(segments.outliers)
+    outliers[1, 30, 0] = outliers[0, 5:7, 2] = True
+    timing = (Timing(delay=0.4e-3), Timing(delay=-2.3e-3, lag=3e-3), Timing())
+    loudness = draw.uniform(0.5, 2.0, segments.loudness.shape)
+    segments = replace(segments.with_noise(noise), outliers=outliers, timing=timing, loudness=loudness)
+    run = segments.measured + draw.standard_normal(segments.measured.shape)
+    priors = np.ones((len(segments), len(segments.free)))
+    parts = segments.whitened(segments.measured - segments.recorded(run))
+    assert np.allclose(segments.deviation(run, priors), np.concatenate((parts, priors), axis=1), rtol=1e-9, atol=1e-9)

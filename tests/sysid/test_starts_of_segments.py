@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.segments import Segments, cut
+from hydraulic_sysid.estimation.shooting import Shooting
 
 DT, SECONDS = 1e-3, 16.0
 NOISE = {"position": 5e-6, "pressure_a": 4e3, "pressure_b": 4e3}
@@ -100,3 +102,17 @@ def test_directions_that_are_kept_lead_to_the_same_minimum(model: Model, segment
     again = fit_segments(plant.with_parameters(found.values), segments, [key], FitSettings())
     assert again.values[key] == pytest.approx(found.values[key], rel=1e-3)
     assert again.cost == pytest.approx(found.cost, rel=1e-4)
+
+
+def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(
+    model: Model, segments: list[Segments]
+) -> None:
+    shooting = Shooting(Plant.for_fits(model), segments)
+    plant = Plant.for_fits(model.with_effect("supply_droop"))
+    soft, stiff = (
+        plant.with_parameters({"supply_droop.resistance": r, "supply_droop.time": t})
+        for r, t in ((1e9, 0.1), (1e12, 1e-3))
+    )
+    assert len(shooting.try_out(soft, shooting.initial_states)) == 1
+    with pytest.raises(SimulationError, match="asks for steps of"):
+        shooting.try_out(stiff, shooting.initial_states)

@@ -89,7 +89,7 @@ def recorded(values: Array, delay: float, lag: float) -> Array:
 
 @jit
 def whitened(values: Array, width: int, coefficients: Array, head: Array) -> Array:
-    """Σ_l c_l·x_{t−l} of segments (S, n·width), n samples of ``width`` values; ``head`` (p, p) of the first p samples."""
+    """Σ_l c_l·x_{t−l} of segments (S, n·width), n samples of ``width`` values; the first p by ``head`` (p, p)."""
     found = np.empty_like(values)
     for s in range(values.shape[0]):
         _whiten(values[s], width, coefficients, head, found[s])
