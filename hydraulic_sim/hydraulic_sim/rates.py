@@ -34,14 +34,19 @@ def shortest_sampling(effects: Iterable[Effect], values: Mapping[str, float]) ->
 
 
 def oil(p: Mapping[str, float]) -> float:
-    """The hydraulic natural frequency [rad/s] with the piston at the stop where it is higher.
+    """The hydraulic natural frequency [rad/s] with the piston at the stop where it is higher."""
+    return max(oil_at(p, -0.5 * p["stroke"]), oil_at(p, 0.5 * p["stroke"]))
+
+
+def oil_at(p: Mapping[str, float], position: float) -> float:
+    """The hydraulic natural frequency [rad/s] with the piston at a ``position`` [m] from mid stroke.
 
     ω² = β·(A_A²/V_A + A_B²/V_B)/M, Merritt (1967), Hydraulic Control Systems, ch. 6.
     """
     a, b, stroke = p["piston_area_a"], p["piston_area_b"], p["stroke"]
-    near_a = a**2 / p["dead_volume_a"] + b**2 / (p["dead_volume_b"] + b * stroke)
-    near_b = b**2 / p["dead_volume_b"] + a**2 / (p["dead_volume_a"] + a * stroke)
-    return math.sqrt(abs(p["bulk_modulus"] * max(near_a, near_b) / p["moving_mass"]))
+    stiffness = a**2 / (p["dead_volume_a"] + a * (0.5 * stroke + position))
+    stiffness += b**2 / (p["dead_volume_b"] + b * (0.5 * stroke - position))
+    return math.sqrt(abs(p["bulk_modulus"] * stiffness / p["moving_mass"]))
 
 
 def _own(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:

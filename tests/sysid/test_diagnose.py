@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict
 from hydraulic_sysid.diagnosis.search import search as search_module
@@ -17,6 +19,7 @@ from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, as_filed, bey
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
+from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError, Progress
 from hydraulic_sysid.diagnosis.search.score_test import CandidateScore
 from hydraulic_sysid.diagnosis.search.search import (
     CandidateRefit,
@@ -31,7 +34,7 @@ from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise import code_step
 from hydraulic_sysid.estimation.parameters import bounded, scale
-from hydraulic_sysid.estimation.segments import cut
+from hydraulic_sysid.estimation.segments import cut, segment_length
 
 DT = 1e-3
 
@@ -202,6 +205,70 @@ def test_a_small_further_effect_that_may_be_anything_is_not_named(
     assert kept.added == ["stribeck_friction", "external_leakage"][: 1 + named]
     assert kept.final is (final if named else before)
     assert kept.misfits[kept.added[-1]] == kept.final.misfit
+
+
+@pytest.mark.parametrize(("name", "kept"), [("sensor_lag", False), ("sensor_quantisation", True)])
+def test_an_effect_without_which_nothing_is_left_either_is_not_missing(model, name: str, kept: bool) -> None:
+    one = model.with_effect("constant_load")
+    base, before = state(model, 3000 * 60.0, {}), state(one, 3000 * 0.98, {})
+    final = state(one.with_effect(name), 3000 * 0.95, {})
+    misfits = {"constant_load": before.misfit, name: final.misfit}
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {name: before})
+    assert decisive(found).added == ["constant_load", name][: 1 + kept]
+
+
+def test_segments_hold_no_more_than_so_many_periods_of_the_oil(model) -> None:
+    light = model.with_entry("moving_mass", value=model.value("moving_mass") / 100.0, bounds=None)
+    records = [standing(5.0)]
+    assert segment_length(model, records) == 0.5
+    assert segment_length(light, records) == pytest.approx(25.0 / 393.0, rel=0.05)
+    assert segment_length(light, [Record.sampled("slow", 0.02, {"drive": np.zeros(200)})]) == pytest.approx(0.8)
+
+
+def test_progress_tells_what_is_best_and_ends_when_its_time_is_over() -> None:
+    told: list[str] = []
+    progress = Progress(told.append, within=100.0)
+    progress.reached((), at(3000 * 4.0))
+    progress("one")
+    progress.reached(("backlash",), at(3000 * 2.25))
+    progress.reached(("valve_deadband",), at(3000 * 9.0))
+    progress("two")
+    assert told == ["one · 70 s left", "two · best so far: backlash, 2 → 1.5 × noise · 70 s left"]
+    with pytest.raises(OutOfTimeError, match="100 s are over"):
+        replace(progress, begun=progress.begun - 71.0)("three")
+
+
+def test_a_search_that_is_ended_early_gives_the_best_so_far(model) -> None:
+    drive = np.repeat(np.random.default_rng(2).uniform(-3.0, 3.0, 20), 250)
+    run, draw = Plant(model.with_effect("valve_deadband")).simulate(drive, DT), np.random.default_rng(3)
+    noise = {"position": 1e-5, "pressure_a": 2e4, "pressure_b": 2e4}
+    channels = {c: run[c] + std * draw.standard_normal(drive.size) for c, std in noise.items()}
+    for key in model.free_keys():
+        model = model.with_entry(key, free=key == "viscous_friction.coefficient")
+
+    def tell(text: str) -> None:
+        if text.startswith("fitting with valve_deadband"):
+            raise KeyboardInterrupt
+
+    found = diagnose(model, [Record.sampled("r", DT, {"drive": drive, **channels})], progress=once(tell))
+    said = found.result["verdict"]
+    assert said["kind"] == "undecided" and said["effects"] == ["valve_deadband"] and not found.decided
+    assert "was ended before it was done. Best so far: valve_deadband added." in said["text"]
+
+
+def once(tell: Callable[[str], None]) -> Callable[[str], None]:
+    """A user who presses Ctrl-C one time."""
+    pressed: list[str] = []
+
+    def say(text: str) -> None:
+        if not pressed:
+            try:
+                tell(text)
+            except KeyboardInterrupt:
+                pressed.append(text)
+                raise
+
+    return say
 
 
 def test_what_a_fault_of_the_recording_explains_is_explained(model) -> None:

@@ -22,7 +22,7 @@ from .errors import CalibrationError
 from .levenberg_marquardt import Minimum, NormalEquations, minimise
 from .parameters import NO_PRIORS, Parameters, Priors
 from .projection import Projection
-from .segments import Segments, cut
+from .segments import Segments, cut, segment_length
 from .shooting import Shooting
 
 _SETTLED = 1e-4  # share of the cost below which moving initial states on gains no more
@@ -38,8 +38,8 @@ _MILD = 3.0  # residual over noise from which a robust loss counts less than the
 class FitSettings:
     """What a user may choose about a fit."""
 
-    length: float = 0.5
-    """Seconds of a segment."""
+    length: float | None = None
+    """Seconds of a segment; None: as the plant asks for (`segments.segment_length`)."""
     robust: bool = False
     """Let residuals beyond three times the noise count less (soft L1)."""
     most_steps: int = 25
@@ -47,6 +47,10 @@ class FitSettings:
     """The fit is done when another step would be shorter than this many standard errors."""
     least_gain: float = 1e-6
     """Or when a step lowers the sum of squares by no more than this share."""
+
+    def seconds(self, model: Model, records: Sequence[Record]) -> float:
+        """Of a segment of these records."""
+        return self.length or segment_length(model, records)
 
 
 @dataclass(frozen=True)
@@ -229,7 +233,7 @@ def fit(
     records: Sequence[Record],
     keys: Sequence[str],
     settings: FitSettings | None = None,
-    progress: Callable[[int, float], None] | None = None,
+    progress: Callable[[int, float], object] | None = None,
 ) -> Fit:
     """Fit the parameters ``keys`` of a model to records. ``progress`` gets each step's number and residual over noise.
 
@@ -240,7 +244,8 @@ def fit(
     if not records:
         raise CalibrationError("there is no record to calibrate on")
     plant = Plant.for_fits(model)
-    return fit_segments(plant, cut(records, model.kind, settings.length, settings.robust), keys, settings, progress)
+    segments = cut(records, model.kind, settings.seconds(model, records), settings.robust)
+    return fit_segments(plant, segments, keys, settings, progress)
 
 
 def fit_segments(
@@ -248,7 +253,7 @@ def fit_segments(
     segments: Sequence[Segments],
     keys: Sequence[str],
     settings: FitSettings,
-    progress: Callable[[int, float], None] | None = None,
+    progress: Callable[[int, float], object] | None = None,
     priors: Priors = NO_PRIORS,
 ) -> Fit:
     """As `fit`, to segments that were cut before, with what is known of parameters beforehand."""

@@ -7,6 +7,7 @@ the parameters (Bock 1987, multiple shooting; here without continuity between se
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,9 @@ from functools import cached_property
 import numpy as np
 from scipy.signal import savgol_filter
 
+from hydraulic_sim import rates
 from hydraulic_sim.arrays import Array, Index, Mask
+from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 
@@ -26,6 +29,8 @@ from .saturation import runs
 from .velocity_filter import VelocityFilter
 from .whitened_residual import residual
 
+LONGEST = 0.5  # s of a segment, …
+PERIODS = 25.0  # … or of the oil's oscillation: over more of them a small error of a frequency is a large one of phase
 MEASURED = ("position", "pressure_a", "pressure_b")
 """Channels that are fitted, where a record has them."""
 _STATES = ("position", "velocity", "pressure_a", "pressure_b")  # the first of every plant
@@ -108,7 +113,7 @@ class Segments:
         return [noise.missing(self.outliers[:, :, c]) for c, noise in enumerate(self.noise)]
 
     @cached_property
-    def _reading(self) -> tuple[Array, ...]:
+    def _reading(self) -> tuple[Array | Index | Mask, ...]:
         """How each channel is read and whitened, as `whitened_residual.residual` takes it."""
         orders = np.array([n.order for n in self.noise])
         coefficients = np.zeros((len(orders), orders.max() + 1))
@@ -211,6 +216,15 @@ class Segments:
                 channel = self.channels.index(_STATES[index])
                 prior[:, place] *= noise[channel].std / self.noise[channel].std
         return replace(self, noise=tuple(noise), prior_std=prior, nuisance=self.nuisance[..., :0])
+
+
+def segment_length(model: Model, records: Sequence[Record]) -> float:
+    """Seconds of a segment, from the oil's natural frequency with the piston in mid stroke and the sampling."""
+    shortest = max((2.0 * _FEWEST * r.dt for r in records), default=0.0)
+    if model.kind != "hydraulic":
+        return max(LONGEST, shortest)
+    values = {k: model.value(k) for k in model.keys()}  # noqa: SIM118, a method of the model
+    return max(min(LONGEST, PERIODS * 2.0 * math.pi / rates.oil_at(values, 0.0)), shortest)
 
 
 def spread(segments: Sequence[Segments], most: int) -> list[Segments]:

@@ -181,7 +181,11 @@ def add_diagnosis_options(parser: argparse.ArgumentParser) -> None:
 def add_segment_option(parser: argparse.ArgumentParser) -> None:
     """``--segment SECONDS``: how long the segments are whose initial states are fitted too."""
     parser.add_argument(
-        "--segment", "--piece", metavar="SECONDS", type=float, default=0.5, help="length of a segment (default 0.5)"
+        "--segment",
+        "--piece",
+        metavar="SECONDS",
+        type=cli.positive,
+        help="length of a segment (default 0.5, or 25 periods of the oil's oscillation where these are shorter)",
     )
 
 

@@ -31,7 +31,8 @@ examples:
   python -m hydraulic_sysid diagnose --model my.yaml --record a.csv b.csv --propose my_effect.py --out runs/mine
 
 exit codes: 0 nothing is missing, or what is missing or wrong was found and named; 1 something is left that was not
-named (outside the library, or effects that these data cannot tell apart); 2 unusable input
+named (outside the library, effects that these data cannot tell apart, or a search that was ended early); 2 unusable
+input
 """
 
 
@@ -40,6 +41,12 @@ def main(argv: list[str] | None = None) -> int:
     parser = opt.parser("diagnose", __doc__, EPILOG)
     opt.add_diagnosis_options(parser)
     parser.add_argument("--apply", action="store_true", help=f"write the model that the verdict names ({opt.MODEL})")
+    parser.add_argument(
+        "--within",
+        metavar="SECONDS",
+        type=cli.positive,
+        help="end the search after about so long; the answer is the best so far and says so (as after Ctrl-C)",
+    )
     parser.add_argument(
         "--propose",
         metavar="FILE.py",
@@ -56,7 +63,7 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
         _check_name(options.propose, model)
     records = opt.read_records(options)
     validation = opt.read_kept_back(options.holdout, options)
-    done = diagnose(model, records, validation, FitSettings(length=options.segment), say)
+    done = diagnose(model, records, validation, FitSettings(length=options.segment), say, options.within)
     kind = done.result["verdict"]["kind"]
     models = {f"competing_{name}.yaml": model for name, model in done.competing.items()}
     notes = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from typing import Any
 
@@ -56,6 +56,7 @@ def calibrate(
     same = [t.name for t in test if any(_shares_samples(t, r) for r in records)]
     if same:
         raise CalibrationError(f"test records are also among those to fit: {', '.join(same)}")
+    settings = replace(settings, length=settings.seconds(model, [*records, *test]))
     say = progress or (lambda _: None)
     say("residuals before")
     before = evaluate(model, records, settings)

@@ -13,6 +13,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.estimation.errors import CalibrationError
+from hydraulic_sysid.estimation.segments import LONGEST, segment_length
 
 from . import experiment, flows, forces, pressures, recording, travel
 from .finding import CONTRADICTION, DOUBTFUL, NOT_IDENTIFIABLE, SEVERITIES, Finding, merged
@@ -21,8 +22,6 @@ from .observed import FEWEST_SAMPLES, Observed, Windows
 from .senses import senses
 from .stops import wrong_stops
 from .units import wrong_units
-
-SEGMENT = 0.5  # s, as fits have it
 
 _OF_CHANNELS = (
     recording.constant, recording.clipped, recording.frozen, recording.beyond_limit, recording.saturated,
@@ -34,17 +33,18 @@ _OF_RECORDS = (pressures.beyond_supply, pressures.below_tank, pressures.below_va
 def check(
     model: Model,
     records: Sequence[Record],
-    length: float = SEGMENT,
+    length: float | None = None,
     keys: Sequence[str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """The document: what the records contradict, what is doubtful, and what they cannot identify. Nothing is fitted.
 
-    :param length: of the segments that are linearised [s]
+    :param length: of the segments that are linearised [s] (default: as the plant asks for)
     :param keys: parameters that are to be identified (default: the model's free ones)
     :raises CalibrationError: no record, or one without drive or position.
     :raises hydraulic_sim.errors.ModelError: a model that does not compose.
     """
+    length = length or segment_length(model, records)
     say = progress or (lambda _: None)
     say("the records against the model file")
     found = contradictions(model, records)
@@ -83,7 +83,7 @@ def contradictions(model: Model, records: Sequence[Record]) -> list[Finding]:
     units = wrong_units(every)
     if units:  # what follows from a channel of the wrong size says nothing new
         return merged(found + units)
-    travelled = travel.beyond_stroke(every) or wrong_stops(model, records, SEGMENT)
+    travelled = travel.beyond_stroke(every) or wrong_stops(model, records, LONGEST)
     found += experiment.standing(every) + travelled
     signed = []
     for seen, signs in zip(every, senses(every), strict=True):

@@ -75,18 +75,20 @@ def diagnose(
     validation: Sequence[Record] = (),
     settings: FitSettings | None = None,
     progress: Callable[[str], None] | None = None,
+    within: float | None = None,
 ) -> Diagnosis:
     """Find the library effects that ``model`` lacks to explain ``records``.
 
     Parameters are fitted to ``records``; an effect counts only if it lowers the error on ``validation`` too (default:
-    every third block of every record). Records need drive and position; pressures distinguish more.
+    every third block of every record). Records need drive and position; pressures distinguish more. After ``within``
+    seconds, or when the user ends it (KeyboardInterrupt), the best so far is the answer, marked as such.
 
     :raises DiagnosisError: no records, or unusable ones.
     :raises hydraulic_sim.errors.ModelError: a model that does not compose.
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
     say = progress or (lambda _: None)
-    search = Search.of(model, records, validation, settings or FitSettings(), say)
+    search = Search.of(model, records, validation, settings or FitSettings(), say, within)
     say("the records against the model file")
     checked = contradictions(model, [*records, *validation])
     found = verdicts.conclusive(search.run())

@@ -33,6 +33,7 @@ from .frozen_jacobian import Refit, as_it_is, refit
 from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material, misfit, unexplained_share
+from .progress import OutOfTimeError, Progress
 from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import Remainder, Spikes, immaterial, negligible, remainders, spikes
 from .score_test import CandidateScore, score
@@ -139,6 +140,8 @@ class SearchResult:
     moved: Sequence[Deviation] = ()
     faults: Sequence[RecordingFault] = ()
     as_recorded: Misfit | None = None
+    stopped: bool = False
+    """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""
 
     @property
     def before(self) -> Misfit:
@@ -174,9 +177,16 @@ class SearchResult:
 class Search:
     """One search over one split of records."""
 
-    def __init__(self, model: Model, split: Split, settings: FitSettings, say: Say) -> None:
-        self.given, self.split, self.settings, self.say = model, split, settings, say
+    def __init__(
+        self, model: Model, split: Split, settings: FitSettings, say: Say, within: float | None = None
+    ) -> None:
+        self.given, self.split, self.settings = model, split, settings
+        self.say = Progress(say, within)
         self.faults: list[RecordingFault] = []
+        self.path: list[SearchState] = []
+        """The model and what it became with each effect added, as far as the search has come …"""
+        self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
+        """… and the state that candidates were refitted on last, with these refits."""
         self.as_recorded: Misfit | None = None
         self.priors = priors(model)
         self._first = replace(settings, least_gain=FIRST_GAIN)
@@ -184,17 +194,21 @@ class Search:
 
     @classmethod
     def of(
-        cls, model: Model, records: Sequence[Record], validation: Sequence[Record], settings: FitSettings, say: Say
-    ) -> Search:
+        cls, model: Model, records: Sequence[Record], validation: Sequence[Record], settings: FitSettings, say: Say,
+        within: float | None = None,
+    ) -> Search:  # fmt: skip
         """Cut the records; free parameters without bounds get those of a data sheet.
 
+        :param within: seconds after which the search ends with the best so far
         :raises DiagnosisError: there are no records, or one cannot be cut.
         """
         if not records:
             raise DiagnosisError("there is no record to diagnose")
         model = bounded(model)
+        length = settings.seconds(model, [*records, *validation])
         try:
-            return cls(model, split(records, validation, model, settings.length), settings, say)
+            cuts = split(records, validation, model, length)
+            return cls(model, cuts, replace(settings, length=length), say, within)
         except SegmentError as error:
             raise DiagnosisError(str(error)) from None
 
@@ -202,16 +216,25 @@ class Search:
         """The model, fitted and judged by the noise that it leaves; the data sheet is relaxed where that helps."""
         self.say("fitting the model")
         strict = self.judged(self.state(self.given, self._first))
+        self.path = [strict]
+        self.say.reached((), strict.misfit)
         if strict.misfit.variance < LOOSE:
             return strict
         self.say("fitting the model within the tolerances of its data sheet")
         before = self.split
         starts = [relaxed(strict.model), *beyond(strict.model, strict.linearisation.parameters.at_bound)]
-        loose = min((self.state(m, self._last) for m in starts), key=lambda s: s.misfit.total)
+        loose = min((self.nearer(m, strict.misfit) for m in starts), key=lambda s: s.misfit.total)
         if material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER:
             return self.judged(loose)
         self.split = before
         return strict
+
+    def nearer(self, model: Model, misfit: Misfit) -> SearchState:
+        """A model fitted: to the end only if it is near, or comes near from where ``misfit`` was left."""
+        if misfit.variance < FAR_OFF:
+            return self.state(model, self._last)
+        found = self.state(model, self._first)
+        return self.state(found.model, self._last) if found.misfit.variance < FAR_OFF else found
 
     def judged(self, state: SearchState) -> SearchState:
         """A state, judged by the noise that it shows itself."""
@@ -229,6 +252,7 @@ class Search:
     def recorded(self, base: SearchState) -> SearchState:
         """A state with its candidates explored, and with every fault of the recording that explains more than they."""
         while base.misfit.variance - 1.0 > NOTHING_LEFT:
+            self.path = [base]
             base = self.explore(base)
             left = remainders(self.split, base.residual)
             if len(self.faults) == MOST_FAULTS or negligible(left, UNNOTICED):
@@ -238,6 +262,9 @@ class Search:
             if immaterial(base.misfit, left):
                 # A disturbance is free enough to take up what laws leave, the timing of a channel is not.
                 faults = [f for f in faults if not f.linear]
+            if base.misfit.little:  # filters of sound transducers delay by a part of a sampling interval, too
+                shortest = min(s.record.dt for s in self.split.segments)
+                faults = [f for f in faults if f.linear or abs(f.size) >= shortest]
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
                 break
@@ -309,14 +336,14 @@ class Search:
             tied = [(s, d) for s, d in tried if d is not deviation and not _worse(s.misfit, best.misfit)]
             others = tuple(with_error(d, parameter_errors(s.linearisation)) for s, d in tied)
             deviation = replace(deviation, alternatives=others)
-            if deviation.sure:
-                moved, done = [*moved, deviation], best
-                continue
-            # It is where it was: what the fit gained came from the others, which had stopped short.
-            back = self.state(restored(best.model, self.given, named), self._last)
+            back = done
+            if not deviation.sure:
+                # Another number may say the same, or what the fit gained came from the others, which had stopped short.
+                back = self.state(restored(best.model, self.given, named), self._last)
             if done.misfit.total - back.misfit.total < done.misfit.least:
-                break
-            done = back
+                moved, done = [*moved, deviation], best
+            else:
+                done = back
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
             moved = [replace(d, instead=self.instead(bare, done, d, moved)) for d in moved]
         misfits = found.misfits
@@ -352,8 +379,9 @@ class Search:
             smooth = smooth.without_effect(name)
         segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
         done = fit_segments(
-            Plant.for_fits(smooth), segments, smooth.movable_keys(), settings or self.settings, priors=self.priors
-        )
+            Plant.for_fits(smooth), segments, smooth.movable_keys(), settings or self.settings,
+            progress=lambda *_: self.say.left(), priors=self.priors,
+        )  # fmt: skip
         at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors)
         if not seen:
             return SearchState(at.model, at, misfit(self.split, at.costs), at.residual)
@@ -370,10 +398,18 @@ class Search:
         # What rounding explains shows once the initial states have settled with it.
         worth = [s for s in scores if s.reduction > least or observed(s.effect)]
         best = varied(worth, ALIKE if most < MOST_REFITS else most)[:most]
-        tried = [(self.refit(base, s), observed(s.effect)) for s in best]
+        every: list[CandidateRefit] = []
+        self.tried = (base, every)
+        for s in best:
+            every.append(self.refit(base, s))
+            self.say.reached(self._added(every[-1].refit.model), every[-1].misfit)
+        tried = [(r, observed(s.effect)) for r, s in zip(every, best, strict=True)]
         refits = [r for r, seen in tried if not seen or base.misfit.total - r.misfit.total > least]
         refits.sort(key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
+
+    def _added(self, model: Model) -> list[str]:
+        return [e for e in model.effects if e not in self.given.effects]
 
     def refit(self, base: SearchState, candidate: CandidateScore) -> CandidateRefit:
         """A candidate refitted on a state, from where its score is best."""
@@ -406,8 +442,31 @@ class Search:
         return min(found, key=lambda s: s.misfit.total, default=None)
 
     def run(self) -> SearchResult:
-        """Search until the noise by which it judged is the noise that its result leaves."""
-        return self.concluded(decisive(self.searched()))
+        """Search until the noise by which it judged is the noise that its result leaves.
+
+        Where the time is over or the user ends it (Ctrl-C), the best so far; a second Ctrl-C ends that, too.
+
+        :raises OutOfTimeError: before there was anything.
+        """
+        try:
+            return self.concluded(decisive(self.searched()))
+        except (OutOfTimeError, KeyboardInterrupt):
+            if not self.path:
+                raise
+            return self.so_far()
+
+    def so_far(self) -> SearchResult:
+        """The best so far: effects added, and the best of those that were tried next, fitted."""
+        self.say = replace(self.say, within=None)
+        path, (on, refits) = list(self.path), self.tried
+        if on is not None and on.model.effects == path[-1].model.effects:
+            nearest = sorted(refits, key=lambda r: r.misfit.total)[:1]
+            better = self.finish(replace(path[-1], refits=nearest), _anything)
+            path += [better] if better is not None else []
+        names = [_new(state, former) for former, state in zip(path, path[1:], strict=False)]
+        misfits = {name: state.misfit for name, state in zip(names, path[1:], strict=True)}
+        found = SearchResult(self.given, self.split, self.settings, path[0], path[-1], misfits, {}, stopped=True)
+        return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
 
     def searched(self) -> SearchResult:
         """The search itself, the data sheet as loose as it was taken."""
@@ -428,6 +487,7 @@ class Search:
     def forward(self, base: SearchState, known: SearchState | None = None) -> SearchResult:
         """Forward from the base or from what is ``known``, backward, and every effect added against its competitors."""
         path, added = [base], list[str]()
+        self.path = path
         if known is not None:
             added = [e for e in known.model.effects if e not in base.model.effects]
             path.append(self.explore(known, most=LATER_REFITS) if known.misfit.variance - 1.0 > NOTHING_LEFT else known)
@@ -442,6 +502,8 @@ class Search:
             if better is None:
                 break
             added.append(_new(better, path[-1]))
+            self.path = [*path, better]
+            self.say.reached(added, better.misfit)
             nothing = better.misfit.variance - 1.0 < NOTHING_LEFT
             last = len(added) == MOST_EFFECTS and explained(base.misfit, better.misfit) > MOSTLY
             path.append(better if nothing or last else self.explore(better, most=LATER_REFITS))
@@ -527,20 +589,29 @@ class Search:
 def decisive(found: SearchResult) -> SearchResult:
     """A search without the effects that its data do not name.
 
-    None where so little was left that nothing need be missing, and they leave much of that; and no further one that
-    explains little and may as well be something of another subsystem: that is how far laws are off those of the bench.
+    None where so little was left that nothing need be missing, and they leave much of that; no further one without
+    which nothing is left either, and none that explains little and may as well be something of another subsystem: that
+    is how far laws are off those of the bench.
     """
     base, final = found.base.misfit, found.final.misfit
     if found.added and base.little and unexplained_share(base, final) > SMALL_UNEXPLAINED:
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
-        if vague(found, name):
+        if needless(found, name) or vague(found, name):
             misfits = {other: misfit for other, misfit in found.misfits.items() if other != name}
             competing = {other: state for other, state in found.competing.items() if other != name}
             without = found.competing[name]
             misfits[next(reversed(misfits))] = without.misfit
             return decisive(replace(found, final=without, misfits=misfits, competing=competing))
     return found
+
+
+def needless(found: SearchResult, name: str) -> bool:
+    """Whether nothing is left without an effect, either; what the records show by themselves is there all the same."""
+    without = found.competing.get(name)
+    if without is None or without is found.base or observed(found.model.library[name]):
+        return False
+    return without.misfit.variance - 1.0 < NOTHING_LEFT
 
 
 def vague(found: SearchResult, name: str) -> bool:

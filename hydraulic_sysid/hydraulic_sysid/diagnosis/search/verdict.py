@@ -29,6 +29,7 @@ COMPLETE = "complete"
 DATA_SHEET = "data sheet"
 RECORDING = "recording"
 OUTSIDE = "outside the library"
+UNDECIDED = "undecided"
 DECIDED = (MISSING, COMPLETE, DATA_SHEET, RECORDING)
 """Verdicts that say which model explains the records."""
 
@@ -116,6 +117,8 @@ def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dic
 
 def kind_of(result: SearchResult, tied: bool) -> str:
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added."""
+    if result.stopped:
+        return UNDECIDED
     final = result.final.misfit
     left = unexplained_share(result.base.misfit, final)
     little = final.little or immaterial(final, result.remainders)
@@ -164,6 +167,11 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     left = " ".join([remainder_sentence(result.remainders), *noise_sentences(result)])
     aside = set_aside_sentences(result.split.set_aside)
     fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
+    if verdict.kind == UNDECIDED:
+        reached = (
+            f"{_and(result.added)} added. {fell}" if result.added else f"no effect added, {final:.3g} × noise left."
+        )
+        return " ".join([f"Undecided: the search was ended before it was done. Best so far: {reached}", *aside])
     if verdict.kind == COMPLETE:
         return (
             f"Complete: on validation data the residual is {final:.3g} × noise, and no effect of the library lowers it "

@@ -1,0 +1,61 @@
+"""What a search tells while it runs: what is tried, the best so far, how the error falls and what time is left."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from .errors import DiagnosisError
+from .misfit import Misfit
+
+FINISHING = 0.7  # of the time that is allowed: what remains is for the last fit and the document
+
+
+class OutOfTimeError(DiagnosisError):
+    """The time that a search was given is over."""
+
+
+@dataclass
+class Progress:
+    """Tells ``say``; ``within`` seconds of its beginning it ends the search."""
+
+    say: Callable[[str], None]
+    within: float | None = None
+    begun: float = field(default_factory=time.monotonic)
+    first: Misfit | None = None
+    lowest: Misfit | None = None
+    effects: Sequence[str] = ()
+
+    def __call__(self, trying: str) -> None:
+        """Say what comes next.
+
+        :raises OutOfTimeError: there is no time for it.
+        """
+        told = [trying]
+        if self.first is not None and self.lowest is not None and self.lowest is not self.first:
+            fell = f"{self.first.rms_validation:.3g} → {self.lowest.rms_validation:.3g} × noise"
+            told.append(f"best so far: {' + '.join(self.effects) or 'the model'}, {fell}")
+        left = self.left()
+        self.say(" · ".join([*told, f"{left:.0f} s left"] if math.isfinite(left) else told))
+
+    def left(self) -> float:
+        """Seconds until the search has to end.
+
+        :raises OutOfTimeError: there are none.
+        """
+        if self.within is None:
+            return math.inf
+        left = FINISHING * self.within - (time.monotonic() - self.begun)
+        if left < 0.0:
+            raise OutOfTimeError(
+                f"{self.within:g} s are over before the model itself was fitted; allow more, or give less data"
+            )
+        return left
+
+    def reached(self, effects: Sequence[str], misfit: Misfit) -> None:
+        """The model with these effects added leaves this."""
+        self.first = self.first or misfit
+        if self.lowest is None or misfit.total < self.lowest.total:
+            self.lowest, self.effects = misfit, tuple(effects)
