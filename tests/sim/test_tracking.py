@@ -113,3 +113,14 @@ def test_a_held_plant_goes_the_same_path_whatever_its_forces(bench: Model) -> No
         assert other.held_path != one.held_path, key
         assert not np.allclose(pressures(other), pressures(one), rtol=1e-6), key
     assert Plant.for_fits(bench.with_effect("valve_deadband")).held_path != one.held_path
+
+
+@pytest.mark.parametrize("damping", [0.2, 1.0, 2.0])
+def test_a_spool_is_propagated_however_it_is_damped(bench: Model, damping: float) -> None:
+    valve = {"frequency": 250.0, "damping": damping}
+    plant = Plant.for_fits(bench.with_effect("spool_dynamics", valve))
+    drive, seen, starts = slowly(plant)
+    smoothed = np.stack([seen[c] for c in SEEN], axis=-1)
+    (coarse, _), (fine, _) = (p.track(drive, DT, starts, smoothed) for p in (plant.driven(), Plant(plant.model)))
+    lift = plant.state_names.index("spool_dynamics.lift")
+    assert np.allclose(coarse[:, lift], fine[:, lift], rtol=0.0, atol=5e-3)

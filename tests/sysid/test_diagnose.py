@@ -394,6 +394,9 @@ def test_the_step_of_codes_survives_what_a_text_file_rounds_away() -> None:
     assert code_step(np.round(x, 6)) == pytest.approx(step, rel=1e-6)
     assert code_step(np.random.default_rng(0).standard_normal(500)) == 0.0
     assert code_step(np.zeros(50)) == 0.0
+    often = np.tile(np.round(x, 6), 100)
+    often[[7, 400]] += 0.3 * step, 21.7 * step  # spikes
+    assert code_step(often) == pytest.approx(step, rel=1e-6)
 
 
 def test_nonparametric_additions_are_effects_of_their_own_and_none_of_the_library(model) -> None:

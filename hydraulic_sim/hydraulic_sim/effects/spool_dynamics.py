@@ -41,5 +41,5 @@ EFFECT = Effect(
     confused_with=("command_delay", "sensor_lag"),
     alike_without_pressures="lag",
     distinguished_by="phase over frequency at two amplitudes",
-    step_rate=lambda p: 2.0 * math.pi * p["frequency"] if p["frequency"] < IDEAL else 0.0,
+    step_rate=lambda p: 2.0 * math.pi * p["frequency"] * max(1.0, p["damping"]) if p["frequency"] < IDEAL else 0.0,
 )

@@ -22,6 +22,7 @@ from scipy.stats import chi2
 from hydraulic_sim.arrays import Array, Mask
 
 METHOD = "median over blocks of the mean square of fourth differences (white noise), at least LSB/√12"
+_STRAY = 0.01  # of the samples: values that are read once
 _ORDER = 4
 _BLOCK = 100
 _AROUND = 101  # samples over which the scale of differences is taken
@@ -45,9 +46,11 @@ def code_step(signal: ArrayLike) -> float:
     """The step between the codes of a rounded signal ``(N,)`` to a small part of it; 0 where it was not rounded.
 
     The values lie on a lattice; its step is the slope of the values over their number on it, which the digits that
-    a text file leaves out hardly change.
+    a text file leaves out hardly change. A few values that nothing else reads, such as spikes, do not count.
     """
-    values = np.unique(np.asarray(signal, dtype=float))
+    values, counts = np.unique(np.asarray(signal, dtype=float), return_counts=True)
+    if counts[counts == 1].sum() < _STRAY * counts.sum():
+        values = values[counts > 1]
     step = resolution(values)
     if not step > 0.0 or values.size < 3:
         return 0.0

@@ -55,7 +55,7 @@ SUBORDINATE = 0.1  # of all that was explained, below which a further effect mus
 LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
 ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
-LOOSE = 1.1  # mean square over noise from which numbers of the data sheet are tried at all
+LOOSE = 1.03  # mean square over noise from which numbers of the data sheet are tried at all
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
 SUSPECTS = 3  # numbers of the data sheet that are tried at once
@@ -471,7 +471,7 @@ class Search:
     def searched(self) -> SearchResult:
         """The search itself, the data sheet as loose as it was taken."""
         found = self.forward(self.recorded(self.begin()))
-        if not found.added:
+        if not decisive(found).added:
             return found
         before = self.split
         self.judged(self.state(found.final.model, self._last))
@@ -554,8 +554,11 @@ class Search:
             if len(added) == 1 or without_competitor(base, state, name):
                 competing = {**competing, name: base}
                 continue
-            without = self.state(state.model.without_effect(name), self._last)
             others = [a for a in added if a != name]
+            try:
+                without = self.state(state.model.without_effect(name), self._last)
+            except SimulationError:  # with these values the model does not run without it
+                continue
             if _superfluous(base, without, state, name, others):
                 self.say(f"leaving out {name}")
                 added, state, competing, queue = others, without, {}, others
@@ -582,7 +585,10 @@ class Search:
         for name in order[:-1]:
             own = [p.name for p in model.library[name].parameters]
             model = model.with_effect(name, {p: final.model.value(f"{name}.{p}") for p in own})
-            found[name] = self.state(model).misfit
+            try:
+                found[name] = self.state(model).misfit
+            except SimulationError:  # with the values that it has beside the others
+                found[name] = next(reversed(found.values()), base.misfit)
         return {**found, **{name: final.misfit for name in order[-1:]}}
 
 
@@ -594,7 +600,7 @@ def decisive(found: SearchResult) -> SearchResult:
     is how far laws are off those of the bench.
     """
     base, final = found.base.misfit, found.final.misfit
-    if found.added and base.little and unexplained_share(base, final) > SMALL_UNEXPLAINED:
+    if found.added and base.little and final.variance - 1.0 > SMALL_UNEXPLAINED * (base.variance - 1.0):
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
         if needless(found, name) or vague(found, name):
