@@ -105,6 +105,19 @@ def test_a_wrong_supply_pressure_is_a_matter_of_the_data_sheet(model: Model) -> 
     assert "supply_pressure is" in found["verdict"]["text"]
 
 
+def test_areas_that_say_the_same_are_both_named(model: Model) -> None:
+    """With valve flow, mass and friction free a larger area of one side is a smaller one of the other."""
+    for key in ("moving_mass", "bulk_modulus", "coulomb_friction.level", "internal_leakage.coefficient"):
+        model = model.with_entry(key, free=True)
+    truth = {"piston_area_b": 1.02 * model.value("piston_area_b")}
+    found = document(diagnose(model, records(driven(model.with_values(truth)))))
+    assert found["verdict"]["kind"] == "data sheet", found["verdict"]["text"]
+    (number,) = found["data_sheet"]
+    (other,) = number["alternatives"]
+    assert {number["key"], other["key"]} == {"piston_area_a", "piston_area_b"}
+    assert other["standard_error"] < 0.02 * other["nominal"] and f", or {other['key']} is" in found["verdict"]["text"]
+
+
 def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> None:
     late = [{c: np.concatenate((v[:1], v[:1], v[:-2])) if c.startswith("pressure") else v for c, v in run.items()}
             for run in runs]  # fmt: skip
