@@ -15,7 +15,7 @@ from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verd
 from hydraulic_sysid.diagnosis.search import search as search_module
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
-from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, as_filed, beyond, relaxed
+from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, as_filed, relaxed
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
@@ -277,16 +277,6 @@ def test_what_a_fault_of_the_recording_explains_is_explained(model) -> None:
     assert found.before is base.misfit and found.unexplained_share == pytest.approx(1.0)
     found = replace(found, as_recorded=at(3000 * 5.0))
     assert found.before is found.as_recorded and found.unexplained_share < 0.01
-
-
-def test_a_fit_with_a_number_at_its_bound_is_also_begun_beyond_it(model) -> None:
-    low, high = model.entry("moving_mass").bounds
-    (start,) = beyond(model, {"moving_mass": "highest", "viscous_friction.coefficient": "highest"})
-    assert high < start.value("moving_mass") < start.entry("moving_mass").bounds[1]
-    assert start.value("viscous_friction.coefficient") == model.value("viscous_friction.coefficient")
-    (start,) = beyond(model, {"moving_mass": "lowest"})
-    assert start.entry("moving_mass").bounds[0] < start.value("moving_mass") < low
-    assert beyond(model, {}) == []
 
 
 def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:

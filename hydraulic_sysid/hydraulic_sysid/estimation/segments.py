@@ -227,6 +227,11 @@ def segment_length(model: Model, records: Sequence[Record]) -> float:
     return max(min(LONGEST, PERIODS * 2.0 * math.pi / rates.oil_at(values, 0.0)), shortest)
 
 
+def shorter(length: float, times: float, records: Sequence[Record]) -> float:
+    """Seconds of segments so many times shorter, as far as the sampling allows."""
+    return min(length, max(length / times, max(1.25 * _FEWEST * r.dt for r in records)))
+
+
 def spread(segments: Sequence[Segments], most: int) -> list[Segments]:
     """About ``most`` of the segments, spread over all records."""
     every = max(1, round(sum(map(len, segments)) / most))

@@ -76,21 +76,6 @@ def relaxed(model: Model) -> Model:
     return model
 
 
-def beyond(model: Model, at_bound: Mapping[str, str]) -> list[Model]:
-    """The `relaxed` model, all base parameters that ended at a bound of the model file half-way beyond it.
-
-    A resonance has many local minima: with a mass far off, a fit that may move it does not find it. None where no
-    parameter is at a bound that gives way.
-    """
-    loose, values = relaxed(model), {}
-    for key, end in at_bound.items():
-        own, wide = model.entry(key).bounds, loose.entry(key).bounds
-        if own is not None and wide is not None and own != wide:
-            i = int(end == "highest")
-            values[key] = (own[i] * wide[i]) ** 0.5
-    return [loose.with_values(values)] if values else []
-
-
 def priors(given: Model) -> Priors:
     """What a model file says of its numbers: its value, and bounds or tolerance as two standard deviations."""
     loose, found = relaxed(given), {}

@@ -22,11 +22,11 @@ from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
 from hydraulic_sysid.estimation.parameters import bounded
 from hydraulic_sysid.estimation.refinement import refined, usable
-from hydraulic_sysid.estimation.segments import Segments
+from hydraulic_sysid.estimation.segments import Segments, shorter
 
 from .candidates import candidates, observed, subsystem
 from .competing_models import competing_models
-from .data_sheet import Deviation, beyond, priors, relaxed, restored, significant, suspects, with_error
+from .data_sheet import Deviation, priors, relaxed, restored, significant, suspects, with_error
 from .drive_faults import costs_with
 from .errors import DiagnosisError
 from .frozen_jacobian import Refit, as_it_is, refit
@@ -57,6 +57,7 @@ ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
 LOOSE = 1.03  # mean square over noise from which numbers of the data sheet are tried at all
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
+SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
 SUSPECTS = 3  # numbers of the data sheet that are tried at once
 QUIETER = 0.95  # of the noise before: what was judged by that is judged again
@@ -178,9 +179,15 @@ class Search:
     """One search over one split of records."""
 
     def __init__(
-        self, model: Model, split: Split, settings: FitSettings, say: Say, within: float | None = None
+        self,
+        model: Model,
+        split: Split,
+        short: Callable[[], Split],
+        settings: FitSettings,
+        say: Say,
+        within: float | None = None,
     ) -> None:
-        self.given, self.split, self.settings = model, split, settings
+        self.given, self.split, self.short, self.settings = model, split, short, settings
         self.say = Progress(say, within)
         self.faults: list[RecordingFault] = []
         self.path: list[SearchState] = []
@@ -208,7 +215,8 @@ class Search:
         length = settings.seconds(model, [*records, *validation])
         try:
             cuts = split(records, validation, model, length)
-            return cls(model, cuts, replace(settings, length=length), say, within)
+            short = partial(split, records, validation, model, shorter(length, SHORTER, [*records, *validation]))
+            return cls(model, cuts, short, replace(settings, length=length), say, within)
         except SegmentError as error:
             raise DiagnosisError(str(error)) from None
 
@@ -222,19 +230,32 @@ class Search:
             return strict
         self.say("fitting the model within the tolerances of its data sheet")
         before = self.split
-        starts = [relaxed(strict.model), *beyond(strict.model, strict.linearisation.parameters.at_bound)]
-        loose = min((self.nearer(m, strict.misfit) for m in starts), key=lambda s: s.misfit.total)
+        loose = self.nearer(relaxed(strict.model), strict.misfit)
         if material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER:
             return self.judged(loose)
         self.split = before
         return strict
 
     def nearer(self, model: Model, misfit: Misfit) -> SearchState:
-        """A model fitted: to the end only if it is near, or comes near from where ``misfit`` was left."""
+        """A model fitted: to the end only if it is near, or comes near from where ``misfit`` was left.
+
+        A resonance has many local minima. From far off the fit begins once more from where short segments lead: over
+        few periods a wrong frequency is hardly a wrong phase.
+        """
         if misfit.variance < FAR_OFF:
             return self.state(model, self._last)
-        found = self.state(model, self._first)
+        starts = [model, self.fitted_to_short_segments(model)]
+        found = min((self.state(m, self._first) for m in starts), key=lambda s: s.misfit.total)
         return self.state(found.model, self._last) if found.misfit.variance < FAR_OFF else found
+
+    def fitted_to_short_segments(self, model: Model) -> Model:
+        """The model with what a first fit to segments a quarter as long gives."""
+        smooth = self._smooth(model)
+        done = fit_segments(
+            Plant.for_fits(smooth), self.short().some(SHORTER * ENOUGH), smooth.movable_keys(), self._first,
+            progress=lambda *_: self.say.left(), priors=self.priors,
+        )  # fmt: skip
+        return model.with_values(done.values)
 
     def judged(self, state: SearchState) -> SearchState:
         """A state, judged by the noise that it shows itself."""
@@ -374,9 +395,7 @@ class Search:
 
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
-        smooth, seen = model, _observed(model)
-        for name in seen:
-            smooth = smooth.without_effect(name)
+        smooth, seen = self._smooth(model), _observed(model)
         segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
         done = fit_segments(
             Plant.for_fits(smooth), segments, smooth.movable_keys(), settings or self.settings,
@@ -387,6 +406,12 @@ class Search:
             return SearchState(at.model, at, misfit(self.split, at.costs), at.residual)
         rounded = as_it_is(at, _with_values(model, at.model))
         return SearchState(rounded.model, at, misfit(self.split, rounded.costs), rounded.residual)
+
+    def _smooth(self, model: Model) -> Model:
+        """Without effects that have no derivative."""
+        for name in _observed(model):
+            model = model.without_effect(name)
+        return model
 
     def explore(self, base: SearchState, most: int = MOST_REFITS) -> SearchState:
         """Score all candidates on a state and refit the best."""
