@@ -131,6 +131,7 @@ PROPOSED = {
         ),
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
         ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
+        ("undecided", {}, "Let it search to its end; The error falls"),
         ("complete", {"check": [CONTRADICTION]}, "First: The travel is too long. Mend the stroke."),
         ("data sheet", DATA_SHEET, "Ask for the true supply_pressure; 158.1; backlash, piston_area_a"),
         ("recording", RECORDING, "The drive was late: mend it.; Look for a loose contact; Spikes in pressure"),
@@ -143,6 +144,7 @@ def test_the_page_of_every_verdict_says_what_to_do(run: Path, kind: str, change:
         document["residual"]["after_each_effect"] = []
     page = render([{**document, **change}])
     assert [word for word in words.split("; ") if word not in page] == []
+    assert ("of what the noise did not explain before" in page) is (kind != "complete")
 
 
 def test_contradictions_are_warnings_on_top_of_the_answer(
