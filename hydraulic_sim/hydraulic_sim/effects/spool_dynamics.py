@@ -24,6 +24,13 @@ def dynamics(lift, lift_rate, command, frequency, damping):
     return lift_rate, w * w * (command - lift) - 2.0 * damping * w * lift_rate
 
 
+def rate(p):
+    """Of the faster pole."""
+    damping = p["damping"]
+    pole = damping + (damping * damping - 1.0) ** 0.5 if damping > 1.0 else 1.0
+    return 2.0 * math.pi * p["frequency"] * pole if p["frequency"] < IDEAL else 0.0
+
+
 EFFECT = Effect(
     slot="spool",
     summary="second-order response of the spool",
@@ -41,5 +48,5 @@ EFFECT = Effect(
     confused_with=("command_delay", "sensor_lag"),
     alike_without_pressures="lag",
     distinguished_by="phase over frequency at two amplitudes",
-    step_rate=lambda p: 2.0 * math.pi * p["frequency"] * max(1.0, p["damping"]) if p["frequency"] < IDEAL else 0.0,
+    step_rate=rate,
 )

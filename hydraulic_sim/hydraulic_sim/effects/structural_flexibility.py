@@ -27,7 +27,7 @@ def dynamics(deflection, deflection_rate, acceleration, frequency, damping):
 def rate(p):
     """Both masses against each other: faster than either, and stiff where the damper dominates."""
     both = (1.0 + p["mass"] / p["moving_mass"]) ** 0.5
-    return 2.0 * math.pi * p["frequency"] * both * max(1.0, 1.5 * p["damping"] * both) if p["mass"] > 0.0 else 0.0
+    return 2.0 * math.pi * p["frequency"] * both * max(1.0, 2.0 * p["damping"] * both) if p["mass"] > 0.0 else 0.0
 
 
 EFFECT = Effect(

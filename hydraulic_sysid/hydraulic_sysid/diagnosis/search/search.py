@@ -230,7 +230,10 @@ class Search:
             return strict
         self.say("fitting the model within the tolerances of its data sheet")
         before = self.split
-        loose = self.nearer(relaxed(strict.model), strict.misfit)
+        try:
+            loose = self.nearer(relaxed(strict.model), strict.misfit)
+        except SimulationError:  # it went where the plant does not run
+            return strict
         if material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER:
             return self.judged(loose)
         self.split = before
@@ -244,8 +247,12 @@ class Search:
         """
         if misfit.variance < FAR_OFF:
             return self.state(model, self._last)
-        starts = [model, self.fitted_to_short_segments(model)]
-        found = min((self.state(m, self._first) for m in starts), key=lambda s: s.misfit.total)
+        found = self.state(model, self._first)
+        try:
+            short = self.state(self.fitted_to_short_segments(model), self._first)
+        except SimulationError:  # they lead where the plant does not run
+            short = found
+        found = min(found, short, key=lambda s: s.misfit.total)
         return self.state(found.model, self._last) if found.misfit.variance < FAR_OFF else found
 
     def fitted_to_short_segments(self, model: Model) -> Model:
