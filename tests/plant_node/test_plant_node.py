@@ -219,8 +219,10 @@ def test_two_publishers_of_one_name_and_a_longer_watchdog(start: Any, client: An
     wait_until(lambda: states and states[-1].effort[1] == 4.0, "the drive of the first")
     client.source("controller", -4.0)
     wait_until(lambda: health.count("other_publisher") > 100, "the second counted")
+    # The level is that of the last second, in which a busy machine may let neither of them speak.
+    wait_until(lambda: health["command level"] == "1", "the second told")
     assert {state.effort[1] for state in states} <= {0.0, 4.0}
-    assert health["command level"] == "1" and health["second_publisher_of"] == "controller"
+    assert health["second_publisher_of"] == "controller"
     assert process.output().count("a second publisher commands as 'controller' and is refused") == 1
 
     from rclpy.qos import QoSProfile, ReliabilityPolicy
