@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -238,7 +237,8 @@ def test_progress_tells_what_is_best_and_ends_when_its_time_is_over() -> None:
         replace(progress, begun=progress.begun - 71.0)("three")
 
 
-def test_a_search_that_is_ended_early_gives_the_best_so_far(model) -> None:
+@pytest.mark.parametrize("moment", ["fitting with valve_deadband", "noise of the records"])
+def test_a_search_that_is_ended_early_gives_the_best_so_far(model, moment: str) -> None:
     drive = np.repeat(np.random.default_rng(2).uniform(-3.0, 3.0, 20), 250)
     run, draw = Plant(model.with_effect("valve_deadband")).simulate(drive, DT), np.random.default_rng(3)
     noise = {"position": 1e-5, "pressure_a": 2e4, "pressure_b": 2e4}
@@ -246,29 +246,19 @@ def test_a_search_that_is_ended_early_gives_the_best_so_far(model) -> None:
     for key in model.free_keys():
         model = model.with_entry(key, free=key == "viscous_friction.coefficient")
 
+    told, pressed = list[str](), list[str]()
+
     def tell(text: str) -> None:
-        if text.startswith("fitting with valve_deadband"):
+        told.append(text)
+        due = any(t.startswith("fitting with valve_deadband") for t in told) and text.startswith(moment)
+        if due and not pressed:
+            pressed.append(text)
             raise KeyboardInterrupt
 
-    found = diagnose(model, [Record.sampled("r", DT, {"drive": drive, **channels})], progress=once(tell))
+    found = diagnose(model, [Record.sampled("r", DT, {"drive": drive, **channels})], progress=tell)
     said = found.result["verdict"]
     assert said["kind"] == "undecided" and said["effects"] == ["valve_deadband"] and not found.decided
     assert "was ended before it was done. Best so far: valve_deadband added." in said["text"]
-
-
-def once(tell: Callable[[str], None]) -> Callable[[str], None]:
-    """A user who presses Ctrl-C one time."""
-    pressed: list[str] = []
-
-    def say(text: str) -> None:
-        if not pressed:
-            try:
-                tell(text)
-            except KeyboardInterrupt:
-                pressed.append(text)
-                raise
-
-    return say
 
 
 def test_what_a_fault_of_the_recording_explains_is_explained(model) -> None:

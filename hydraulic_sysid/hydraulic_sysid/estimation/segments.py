@@ -24,6 +24,7 @@ from hydraulic_sysid.data.records import Record
 from .errors import SegmentError
 from .noise import noise_std, robust_noise_std, spikes, without
 from .noise_model import ChannelNoise
+from .projection import project_out
 from .recording import Timing
 from .saturation import runs
 from .velocity_filter import VelocityFilter
@@ -137,7 +138,7 @@ class Segments:
         for c in range(len(self.channels)):
             for row, basis in self._missing[c]:
                 own = left[row, c :: len(self.channels)]
-                own -= basis @ (basis.T @ own)
+                own[:] = project_out(basis, own)
         return np.concatenate((left, priors[:, -len(self.free) :]), axis=1)
 
     def recorded(self, run: Array) -> Array:

@@ -229,14 +229,12 @@ class Search:
         if strict.misfit.variance < LOOSE:
             return strict
         self.say("fitting the model within the tolerances of its data sheet")
-        before = self.split
         try:
             loose = self.nearer(relaxed(strict.model), strict.misfit)
         except SimulationError:  # it went where the plant does not run
             return strict
         if material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER:
             return self.judged(loose)
-        self.split = before
         return strict
 
     def nearer(self, model: Model, misfit: Misfit) -> SearchState:
@@ -304,7 +302,7 @@ class Search:
                 break
             self.as_recorded = self.as_recorded or base.misfit
             self.faults = together(self.faults, found.fault)
-            self.split = found.split
+            self.split, self.path = found.split, [found.state]
             base = self.judged(found.state)
         return base if base.scores else self.rounded(base)
 
@@ -435,8 +433,8 @@ class Search:
         for s in best:
             every.append(self.refit(base, s))
             self.say.reached(self._added(every[-1].refit.model), every[-1].misfit)
-        tried = [(r, observed(s.effect)) for r, s in zip(every, best, strict=True)]
-        refits = [r for r, seen in tried if not seen or base.misfit.total - r.misfit.total > least]
+        pairs = zip(every, best, strict=True)
+        refits = [r for r, s in pairs if not observed(s.effect) or base.misfit.total - r.misfit.total > least]
         refits.sort(key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
 
@@ -491,7 +489,8 @@ class Search:
         """The best so far: effects added, and the best of those that were tried next, fitted."""
         self.say = replace(self.say, within=None)
         path, (on, refits) = list(self.path), self.tried
-        if on is not None and on.model.effects == path[-1].model.effects:
+        self.split = path[-1].linearisation.split  # the end may have come while the records were judged anew
+        if on is not None and on.linearisation.split is self.split and on.model.effects == path[-1].model.effects:
             nearest = sorted(refits, key=lambda r: r.misfit.total)[:1]
             better = self.finish(replace(path[-1], refits=nearest), _anything)
             path += [better] if better is not None else []
