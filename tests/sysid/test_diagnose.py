@@ -258,6 +258,7 @@ def test_a_search_that_is_ended_early_gives_the_best_so_far(model, moment: str) 
     found = diagnose(model, [Record.sampled("r", DT, {"drive": drive, **channels})], progress=tell)
     said = found.result["verdict"]
     assert said["kind"] == "undecided" and said["effects"] == ["valve_deadband"] and not found.decided
+    assert said["level"] == "close", "however little it leaves"
     assert "was ended before it was done. Best so far: valve_deadband added." in said["text"]
 
 

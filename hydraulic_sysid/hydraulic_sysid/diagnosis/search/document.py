@@ -18,7 +18,7 @@ from .misfit import UNSEEN, Misfit
 from .nonparametric_curves import NonparametricCurve
 from .search import SearchResult
 from .uncertainty import Known
-from .verdict import MISSING, OUTSIDE, Verdict
+from .verdict import MISSING, OUTSIDE, UNDECIDED, Verdict
 from .worst_segments import worst_segments
 
 _NEAREST = 3
@@ -63,7 +63,7 @@ def document(
         },
         "verdict": {
             "kind": verdict.kind,
-            "level": "explained" if explained else "off" if outside else "close",
+            "level": "explained" if explained and verdict.kind != UNDECIDED else "off" if outside else "close",
             "effects": verdict.possible,
             "subsystem": verdicts.place(result, verdict, curves),
             "text": verdicts.sentences(result, verdict, curves) + verdicts.warning(verdict.possible, imitations),
