@@ -134,8 +134,6 @@ _UNKNOWN = (
            what="a converter bit that is stuck"),
     Hidden("foundation_resonance", SENSOR, {"foundation": (4e-8, 1.5e-7), "foundation_frequency": (7.0, 7.0)},
            what="the floor that carries the sensor resonates"),
-    Hidden("transducer_gain", SENSOR, {"transducer_gain": (0.015, 0.05)}, signed=("transducer_gain",),
-           what="gain error of one pressure transducer"),
 )  # fmt: skip
 
 _RECORDING = (
@@ -145,6 +143,8 @@ _RECORDING = (
            what="pressures that the logger has late"),
     Hidden("drive_late", SENSOR, {"drive_late": (1.2, 1.9)}, said=("drive", "position"),
            what="a drive that the logger has late"),
+    Hidden("transducer_gain", SENSOR, {"transducer_gain": (0.02, 0.05)}, signed=("transducer_gain",),
+           said=("pressure_a_gain",), what="gain error of one pressure transducer"),
     Hidden("spikes", SENSOR, {"spike_share": (2e-3, 5e-3)}, said=("spikes",), what="a loose contact"),
 )  # fmt: skip
 

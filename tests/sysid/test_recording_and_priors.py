@@ -19,7 +19,7 @@ from hydraulic_sysid.estimation.noise import robust_noise_std
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.projection import Projection
-from hydraulic_sysid.estimation.recording import Timing
+from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.segments import cut
 
 Array = np.ndarray
@@ -31,30 +31,30 @@ TIME = DT * np.arange(400)
 @pytest.mark.parametrize("delay", [2.0e-3, -3.0e-3, 0.3e-3, -0.4e-3, 1.5e-3, 7.7e-3])
 def test_a_delayed_sine_is_the_sine_of_an_earlier_time(delay: float) -> None:
     wave = np.sin(2.0 * np.pi * 5.0 * TIME)[None]
-    found = Timing(delay=delay).applied(wave, DT)
+    found = Reading(delay=delay).applied(wave, DT)
     inside = slice(10, -10)
     assert np.allclose(found[0, inside], np.sin(2.0 * np.pi * 5.0 * (TIME - delay))[inside], atol=3e-6)
 
 
 @pytest.mark.parametrize("delay", [2.0e-3, -3.0e-3, 0.3e-3, 1.5e-3])
 def test_a_delayed_ramp_is_one_to_both_its_ends(delay: float) -> None:
-    assert np.allclose(Timing(delay=delay).applied(3.0 * TIME[None], DT), 3.0 * (TIME - delay)[None], atol=1e-12)
+    assert np.allclose(Reading(delay=delay).applied(3.0 * TIME[None], DT), 3.0 * (TIME - delay)[None], atol=1e-12)
 
 
 def test_a_low_pass_delays_a_ramp_by_its_time_constant() -> None:
-    assert np.allclose(Timing(lag=4e-3).applied(3.0 * TIME[None], DT), 3.0 * (TIME - 4e-3)[None], atol=1e-12)
+    assert np.allclose(Reading(lag=4e-3).applied(3.0 * TIME[None], DT), 3.0 * (TIME - 4e-3)[None], atol=1e-12)
 
 
 def test_a_low_pass_of_a_sine_has_the_gain_and_phase_of_its_corner() -> None:
     lag, omega = 4e-3, 2.0 * np.pi * 10.0
-    found = Timing(lag=lag).applied(np.sin(omega * TIME)[None], DT)[0]
+    found = Reading(lag=lag).applied(np.sin(omega * TIME)[None], DT)[0]
     response = 1.0 / (1.0 + 1j * omega * lag)
     settled = slice(100, None)
     assert np.allclose(found[settled], np.imag(response * np.exp(1j * omega * TIME))[settled], atol=1e-3)
 
 
 def test_a_low_pass_and_a_delay_follow_each_other() -> None:
-    both = Timing(delay=2e-3, lag=4e-3).applied(3.0 * TIME[None], DT)
+    both = Reading(delay=2e-3, lag=4e-3).applied(3.0 * TIME[None], DT)
     assert np.allclose(both, 3.0 * (TIME - 6e-3)[None], atol=1e-12)
 
 
@@ -167,7 +167,8 @@ def test_of_one_pressure_in_each_record_both_may_be_late() -> None:
         return {h.name for h in HYPOTHESES if h.shown_by(set(channels))}
 
     assert shown("position", "pressure_a", "pressure_b") == {h.name for h in HYPOTHESES}
-    assert shown("position", "pressure_a") == {"pressure_a", "pressure_a_low_pass", "drive", "position"}
+    of_one = {"pressure_a", "pressure_a_low_pass", "pressure_a_gain"}
+    assert shown("position", "pressure_a") == {*of_one, "drive", "position"}
     assert shown("position") == {"position"}
 
 
@@ -177,7 +178,7 @@ def test_the_levels_of_a_command_are_no_noise_on_it() -> None:
 
 
 def test_more_of_a_fault_that_was_found_before_is_one_fault() -> None:
-    low_pass, other = (next(h for h in HYPOTHESES if h.low_pass is way) for way in (True, False))
+    low_pass, other = (next(h for h in HYPOTHESES if h.what == what) for what in ("lag", "delay"))
     first, more = RecordingFault(low_pass, 4e-3, 1e-4, 100.0), RecordingFault(low_pass, 1e-3, 2e-4, 10.0)
     late = RecordingFault(other, 2e-3, 1e-4, 50.0)
     assert together([first, late], more) == [late, RecordingFault(low_pass, 5e-3, 2e-4, 110.0)]
@@ -192,9 +193,9 @@ def test_the_residual_of_a_run_is_that_of_its_parts() -> None:
     noise = [ChannelNoise(np.array([1.0, -0.5]), 0.3, np.array([0.12, 0.06])), *segments.noise[1:]]
     outliers = np.zeros_like(segments.outliers)
     outliers[1, 30, 0] = outliers[0, 5:7, 2] = True
-    timing = (Timing(delay=0.4e-3), Timing(delay=-2.3e-3, lag=3e-3), Timing())
+    readings = (Reading(delay=0.4e-3), Reading(delay=-2.3e-3, lag=3e-3, gain=0.02), Reading())
     loudness = draw.uniform(0.5, 2.0, segments.loudness.shape)
-    segments = replace(segments.with_noise(noise), outliers=outliers, timing=timing, loudness=loudness)
+    segments = replace(segments.with_noise(noise), outliers=outliers, readings=readings, loudness=loudness)
     run = segments.measured + draw.standard_normal(segments.measured.shape)
     priors = np.ones((len(segments), len(segments.free)))
     parts = segments.whitened(segments.measured - segments.recorded(run))

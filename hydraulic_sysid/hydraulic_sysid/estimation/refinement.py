@@ -17,7 +17,7 @@ from . import noise_model
 from .covariance import inverse
 from .fit import FitPoint
 from .noise_model import ChannelNoise
-from .recording import Timing
+from .recording import Reading
 from .segments import Segments
 
 LATE = 0.35  # sampling intervals by which a channel may be late without being named
@@ -69,14 +69,14 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
     shares = np.where(own, parameters.values / parameters.scales * LAW, 0.0)
     found = []
     for i, s in enumerate(segments):
-        timing = tuple(replace(t, delay=late.get(c, t.delay)) for c, t in zip(s.channels, s.timing, strict=True))
+        readings = tuple(replace(t, delay=late.get(c, t.delay)) for c, t in zip(s.channels, s.readings, strict=True))
         judged = replace(
-            s, loudness=loud[i], outliers=spikes[i], timing=timing, hum=tuple(lines[c] for c in s.channels)
+            s, loudness=loud[i], outliers=spikes[i], readings=readings, hum=tuple(lines[c] for c in s.channels)
         )
         off = _raw_columns(s, columns[i], shares)
         hum = _hum(s, [lines[c] for c in s.channels], [noise[c].std for c in s.channels])
         judged = judged.with_noise([noise[c] for c in s.channels])
-        raw = np.concatenate((off, hum, _filter_states(s, timing), s.disturbance), axis=-1)
+        raw = np.concatenate((off, hum, _filter_states(s, readings), s.disturbance), axis=-1)
         found.append(replace(judged, nuisance=judged.whitened(raw)))
     return found
 
@@ -118,11 +118,11 @@ def _waves(segments: Segments, lines: Sequence[float]) -> Array:
     return np.concatenate((np.sin(angle), np.cos(angle)), axis=-1)
 
 
-def _filter_states(segments: Segments, timing: Sequence[Timing]) -> Array:
+def _filter_states(segments: Segments, readings: Sequence[Reading]) -> Array:
     """What a low pass remembers of before a segment (S, samples, C, K): it fades, as large as a channel may move."""
     time = np.arange(segments.samples) * segments.record.dt
     found = [np.zeros((*segments.measured.shape, 0))]
-    for c, one in enumerate(timing):
+    for c, one in enumerate(readings):
         if one.lag > 0.0:
             rate = float(np.std(np.gradient(segments.smoothed[:, segments.states[c]], segments.record.dt)))
             column = np.zeros((*segments.measured.shape, 1))
@@ -159,14 +159,15 @@ def _delays(point: FitPoint, columns: Sequence[Array], channels: Sequence[str]) 
         every = p.beyond(np.concatenate((own, placed), axis=-1))
         information += np.tensordot(every, every, axes=([0, 1], [0, 1]))
         gradient += np.tensordot(every, p.residual, axes=([0, 1], [0, 1]))
-    now = {c: t.delay / s.record.dt for s in segments for c, t in zip(s.channels, s.timing, strict=True)}
-    named = {c: t.named / s.record.dt for s in segments for c, t in zip(s.channels, s.timing, strict=True)}
+    now = {c: t.delay / s.record.dt for s in segments for c, t in zip(s.channels, s.readings, strict=True)}
+    named = {c: t.named / s.record.dt for s in segments for c, t in zip(s.channels, s.readings, strict=True)}
     dt = {c: s.record.dt for s in segments for c in s.channels}
     late = np.arange(count, count + new)
     off = np.array([now[c] - named[c] for c in channels])
     information += np.diag(np.concatenate((point.parameters.prior_information, np.full(new, TIMING**-2))))
     gradient += np.concatenate((point.parameters.prior_gradient, off * TIMING**-2))
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    known = np.diag(information)
+    scale = np.sqrt(np.where(known > 0.0, known, 1.0))
     cover = inverse(information / np.outer(scale, scale)) / np.outer(scale, scale)
     step = np.clip(off - (cover @ gradient)[late], -LATE, LATE)
     return {c: (named[c] + float(step[k])) * dt[c] for k, c in enumerate(channels)}

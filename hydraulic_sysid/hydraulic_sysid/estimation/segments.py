@@ -25,7 +25,7 @@ from .errors import SegmentError
 from .noise import noise_std, robust_noise_std, spikes, without
 from .noise_model import ChannelNoise
 from .projection import project_out
-from .recording import Timing
+from .recording import Reading
 from .saturation import runs
 from .velocity_filter import VelocityFilter
 from .whitened_residual import residual
@@ -59,8 +59,8 @@ class Segments:
     ``first`` (S,) sample indices, ``samples`` per segment; ``measured`` (S, samples, C) [SI] with the ``noise`` of
     each channel; ``smoothed`` (N, 4) position, velocity and pressures of the whole record, NaN where they were not
     measured; ``free`` the indices of the states that are estimated, F of them, and ``prior_std`` (S, F) how far
-    each may be off [the state's unit; pressures without a sensor: of the supply pressure]; ``timing``: how the
-    channels were recorded; ``hum``: mains lines [Hz] in each; ``outliers`` (S, samples, C): samples that do not
+    each may be off [the state's unit; pressures without a sensor: of the supply pressure]; ``readings``: how
+    the channels were recorded; ``hum``: mains lines [Hz] in each; ``outliers`` (S, samples, C): samples that do not
     count; ``nuisance`` (S, samples·C, K), whitened: what may be off in every segment by about one of each column,
     such as hum and laws that are not quite those of the bench; ``disturbance`` (S, samples, C, D) [SI]: what else
     may be, known from before.
@@ -75,7 +75,7 @@ class Segments:
     smoothed: Array
     free: Index
     prior_std: Array
-    timing: tuple[Timing, ...]
+    readings: tuple[Reading, ...]
     hum: tuple[tuple[float, ...], ...]
     outliers: Mask
     nuisance: Array
@@ -114,15 +114,16 @@ class Segments:
         return [noise.missing(self.outliers[:, :, c]) for c, noise in enumerate(self.noise)]
 
     @cached_property
-    def _reading(self) -> tuple[Array | Index | Mask, ...]:
+    def _compiled(self) -> tuple[Array | Index | Mask, ...]:
         """How each channel is read and whitened, as `whitened_residual.residual` takes it."""
         orders = np.array([n.order for n in self.noise])
         coefficients = np.zeros((len(orders), orders.max() + 1))
         heads = np.zeros((len(orders), orders.max(), orders.max()))
         for c, (noise, p) in enumerate(zip(self.noise, orders.tolist(), strict=True)):
             coefficients[c, : p + 1], heads[c, :p, :p] = noise.filter, noise.head
-        delays, lags = np.array([(t.delay, t.lag) for t in self.timing]).T.copy() / self.record.dt
-        return self.outliers, delays, lags, orders, coefficients, heads, np.ascontiguousarray(self.loudness)
+        delays, lags = np.array([(r.delay, r.lag) for r in self.readings]).T.copy() / self.record.dt
+        gains = np.array([1.0 + r.gain for r in self.readings])
+        return self.outliers, delays, lags, gains, orders, coefficients, heads, np.ascontiguousarray(self.loudness)
 
     @property
     def counted(self) -> Index:
@@ -134,7 +135,7 @@ class Segments:
 
         The ``priors`` of the initial states, or residuals that end with them, are appended.
         """
-        left = np.asarray(residual(self.measured, run, *self._reading))
+        left = np.asarray(residual(self.measured, run, *self._compiled))
         for c in range(len(self.channels)):
             for row, basis in self._missing[c]:
                 own = left[row, c :: len(self.channels)]
@@ -143,7 +144,7 @@ class Segments:
 
     def recorded(self, run: Array) -> Array:
         """(S, samples, C) what a simulated ``run`` of that shape looks like in the record [SI]."""
-        return np.stack([t.applied(run[..., c], self.record.dt) for c, t in enumerate(self.timing)], axis=-1)
+        return np.stack([r.applied(run[..., c], self.record.dt) for c, r in enumerate(self.readings)], axis=-1)
 
     def whitened(self, values: Array) -> Array:
         """(S, samples, C, …) in units of the noise and without its colour, channel by channel: (S, samples·C, …)."""
@@ -299,7 +300,7 @@ def _cut(record: Record, hydraulic: bool, length: float, robust: bool, left_out:
     prior_std = np.stack([np.broadcast_to(prior.get(_STATES[k], unknown), first.shape) for k in free], axis=-1)
     return Segments(
         record, first, samples, channels, noise, measured, smoothed, free, prior_std,
-        tuple(Timing() for _ in channels), tuple(() for _ in channels),
+        tuple(Reading() for _ in channels), tuple(() for _ in channels),
         np.stack([alone[c][index] for c in channels], axis=-1), np.zeros((number, samples * len(channels), 0)),
         np.zeros((*measured.shape, 0)), np.ones((number, len(channels))),
     )  # fmt: skip

@@ -103,6 +103,7 @@ def residual(
     dropped: Mask,
     delays: Array,
     lags: Array,
+    gains: Array,
     orders: Index,
     coefficients: Array,
     heads: Array,
@@ -111,7 +112,8 @@ def residual(
     """``measured`` (S, n, C) − what is recorded of a ``run`` of that shape, whitened: (S, n·C).
 
     ``dropped`` (S, n, C): samples whose residual is taken to be 0; ``delays`` and ``lags`` (C,) as of `recorded`;
-    ``orders`` (C,), ``coefficients`` (C, p + 1), ``heads`` (C, p, p): as of `whitened`; ``loudness`` (S, C).
+    ``gains`` (C,) of the channels; ``orders`` (C,), ``coefficients`` (C, p + 1), ``heads`` (C, p, p): as of `whitened`;
+    ``loudness`` (S, C).
     """
     segments, n, channels = measured.shape
     found = np.empty((segments, n * channels))
@@ -122,7 +124,7 @@ def residual(
                 values[i] = run[s, i, c]
             _record(values, delays[c], lags[c], white)
             for i in range(n):
-                values[i] = 0.0 if dropped[s, i, c] else measured[s, i, c] - values[i]
+                values[i] = 0.0 if dropped[s, i, c] else measured[s, i, c] - gains[c] * values[i]
             order = orders[c]
             _whiten(values, 1, coefficients[c, : order + 1], heads[c], white)
             for i in range(n):

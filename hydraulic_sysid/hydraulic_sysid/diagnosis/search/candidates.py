@@ -71,6 +71,12 @@ def observed(effect: Effect) -> bool:
     return any(p.observed for p in effect.parameters)
 
 
+def delays(effect: Effect) -> bool:
+    """Whether all that the effect brings is time: the plant or a sensor acts later."""
+    brought = [p for p in effect.parameters if p.null is not None and p.free]
+    return bool(brought) and all(p.unit == "s" for p in brought)
+
+
 def probes(effect: Effect, features: RecordFeatures, sizes: Sequence[float] = SIZES) -> Iterator[list[Probe]]:
     """Groups of probes, one group per shape: each of its members moves one parameter off its null value.
 

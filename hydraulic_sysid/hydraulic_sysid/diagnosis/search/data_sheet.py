@@ -8,11 +8,13 @@ that have to move are named, by the cost of holding the others.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.model import Model
 from hydraulic_sysid.estimation.covariance import inverse
 from hydraulic_sysid.estimation.parameters import Priors
@@ -76,6 +78,12 @@ def relaxed(model: Model) -> Model:
     return model
 
 
+def stretched(given: Model) -> list[str]:
+    """Free parameters of a model that go beyond their bounds in the `relaxed` one."""
+    loose = relaxed(given)
+    return [k for k in given.free_keys() if k in given.entries and loose.entries[k] != given.entries[k]]
+
+
 def priors(given: Model) -> Priors:
     """What a model file says of its numbers: its value, and bounds or tolerance as two standard deviations."""
     loose, found = relaxed(given), {}
@@ -118,37 +126,64 @@ def as_filed(model: Model, filed: Model) -> Model:
     return model
 
 
-def suspects(at: Linearisation, given: Model, named: Sequence[str]) -> list[Deviation]:
-    """Numbers of ``given`` whose release beside those ``named`` promises most, the best first.
+@dataclass(frozen=True)
+class HeldNumbers:
+    """What it costs to hold numbers at what the model file says, by the quadratic around a fit of a `relaxed` model.
 
-    ``at``: a fit of a `relaxed` model. What holding numbers costs is that of the quadratic around the fit.
+    ``values`` (n,) of ``keys`` where they are best, as far as they are ``nominal`` (n,) nowhere else; ``cover`` (n, n).
     """
-    parameters, loose = at.parameters, relaxed(given)
-    changed = [k for k, e in loose.entries.items() if e != given.entries.get(k) and k in parameters.keys]
-    keys = [k for k in changed if k not in named]
-    place = [parameters.keys.index(k) for k in keys]
-    cover, values = inverse(at.normal.information), parameters.values[place]
-    nominal = np.array([_nearest(given, k, v) for k, v in zip(keys, values.tolist(), strict=True)])
-    off = (nominal - values) / parameters.scales[place]
-    errors = np.sqrt(np.maximum(np.diag(cover)[place], 0.0)) * parameters.scales[place]
 
-    def cost(of: Sequence[int]) -> float:
-        chosen = [place[i] for i in of]
-        return float(off[of] @ np.linalg.pinv(cover[np.ix_(chosen, chosen)], hermitian=True) @ off[of]) if of else 0.0
+    keys: tuple[str, ...]
+    values: Array
+    nominal: Array
+    cover: Array
 
-    held = list(range(len(keys)))
-    every = cost(held)
-    found = [
-        Deviation(key, float(n), float(v), float(e), every - cost([h for h in held if h != i]))
-        for i, (key, n, v, e) in enumerate(zip(keys, nominal, values, errors, strict=True))
-        if n != v
-    ]
-    return sorted(found, key=lambda d: -d.cost)
+    @classmethod
+    def of(cls, at: Linearisation, given: Model) -> HeldNumbers:
+        """Numbers of ``given`` that are others in the fit ``at``."""
+        parameters, loose = at.parameters, relaxed(given)
+        changed = [k for k, e in loose.entries.items() if e != given.entries.get(k) and k in parameters.keys]
+        fitted = {k: float(parameters.values[parameters.keys.index(k)]) for k in changed}
+        keys = tuple(k for k in changed if _nearest(given, k, fitted[k]) != fitted[k])
+        place = [parameters.keys.index(k) for k in keys]
+        scales = parameters.scales[place]
+        cover = inverse(at.normal.information)[np.ix_(place, place)] * np.outer(scales, scales)
+        nominal = np.array([_nearest(given, k, fitted[k]) for k in keys])
+        return cls(keys, np.array([fitted[k] for k in keys]), nominal, cover)
+
+    def cost(self, moved: Collection[str]) -> float:
+        """Sum of squares that it costs to hold all but these."""
+        held = [i for i, key in enumerate(self.keys) if key not in moved]
+        off = (self.nominal - self.values)[held]
+        scale = np.sqrt(np.maximum(np.diag(self.cover)[held], 1e-300))
+        correlation = self.cover[np.ix_(held, held)] / np.outer(scale, scale)
+        return float(off / scale @ np.linalg.pinv(correlation, hermitian=True) @ (off / scale)) if held else 0.0
+
+    def fewest(self, enough: float) -> Iterator[tuple[str, ...]]:
+        """The fewest numbers that have to move for the others to cost less than ``enough``, then one more each time."""
+        found = False
+        for size in range(len(self.keys) + 1):
+            best = min(combinations(self.keys, size), key=self.cost)
+            found = found or self.cost(best) < enough
+            if found:
+                yield best
+
+    def instead(self, key: str, moved: Sequence[str], enough: float) -> list[tuple[str, ...]]:
+        """Sets with another number in the place of ``key``, of those ``moved``, that cost ``enough`` more at most."""
+        others = [k for k in moved if k != key]
+        swapped = [(*others, other) for other in self.keys if other not in moved]
+        near = [s for s in swapped if self.cost(s) < self.cost(moved) + enough]
+        return sorted(near, key=self.cost)
 
 
 def significant(cost: float, count: int, variance: float) -> bool:
     """Whether a reduction of the sum of squares of ``count`` values is enough for a number to be named."""
-    return cost > max(SIGNIFICANT, VISIBLE * count) * variance
+    return cost > least(count, variance)
+
+
+def least(count: int, variance: float) -> float:
+    """The smallest reduction of the sum of squares of ``count`` values for which a number is named."""
+    return max(SIGNIFICANT, VISIBLE * count) * variance
 
 
 def _nearest(given: Model, key: str, value: float) -> float:

@@ -105,8 +105,9 @@ def diagnose(
     whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
     done = as_filed(finished(found, known), model)
     competing = {name: as_filed(other, model) for name, other in verdicts.alternatives(found, verdict).items()}
-    if verdict.kind == verdicts.INDISTINGUISHABLE:
-        competing["+".join(name for name in verdict.added if verdict.indistinguishable_from(name))] = done
+    tied = [name for name in verdict.added if verdict.indistinguishable_from(name)]
+    if verdict.kind == verdicts.INDISTINGUISHABLE and tied:
+        competing["+".join(tied)] = done
     before, after = found.base.model, found.final.model if found.added or found.moved else None
     suspected = None if not outside else before if proxy else after
     del found, suspect  # their sensitivities would take up the memory that the balances need

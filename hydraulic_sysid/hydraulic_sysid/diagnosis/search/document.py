@@ -16,6 +16,7 @@ from .data_sheet import Deviation
 from .holdout import BLOCK, EVERY
 from .misfit import UNSEEN, Misfit
 from .nonparametric_curves import NonparametricCurve
+from .recording_faults import RecordingFault
 from .search import SearchResult
 from .uncertainty import Known
 from .verdict import MISSING, OUTSIDE, UNDECIDED, Verdict
@@ -91,18 +92,8 @@ def document(
         },
         "data_sheet": [_number(result, d) for d in result.moved],
         "recording": {
-            "faults": [
-                {
-                    "name": f.hypothesis.name,
-                    "channels": list(f.hypothesis.channels),
-                    "size": f.size,
-                    "unit": f.unit,
-                    "standard_error": f.standard_error,
-                    "text": f.text,
-                    "remedy": f.hypothesis.remedy,
-                }
-                for f in result.faults
-            ],
+            "faults": [_fault(f) for f in result.faults],
+            "instead": [_fault(f) for f in result.faults_instead],
             "spikes": [
                 {
                     "channel": s.channel,
@@ -130,6 +121,18 @@ def document(
         "proposed_effect": None,
         "balances": [],
         "worst_segments": worst_segments(result),
+    }
+
+
+def _fault(found: RecordingFault) -> dict[str, Any]:
+    return {
+        "name": found.hypothesis.name,
+        "channels": list(found.hypothesis.channels),
+        "size": found.size,
+        "unit": found.unit,
+        "standard_error": found.standard_error,
+        "text": found.text,
+        "remedy": found.hypothesis.remedy,
     }
 
 

@@ -1,4 +1,4 @@
-"""How the records were made, as an explanation of its own: channels that are late, early or behind a low pass.
+"""How the records were made, as an explanation of its own: channels that are late, early, behind a low pass or scaled.
 
 Each fault has one size. For every size that is tried the recorded signals are made anew from one simulated run, and the
 free parameters follow to first order (variable projection); nothing else is simulated.
@@ -9,35 +9,46 @@ from __future__ import annotations
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.data.display import percent
 from hydraulic_sysid.estimation.levenberg_marquardt import bounded_step
-from hydraulic_sysid.estimation.recording import Timing
+from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.segments import Segments
 
 from .drive_faults import DRIVE_HYPOTHESES, DriveHypothesis, disturbed, freedom
 from .linearisation import Linearisation
 
 ENOUGH = 50  # segments that do for a look
-MOST = 20.0  # sampling intervals by which a channel may be late
-TRIED = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # sampling intervals from which the best size is searched
+MOST = 64.0  # sampling intervals by which a channel may be late, or per cent by which its gain may be off
+TRIED = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of these, from which the best size is searched
+PER_CENT = 0.01
 PRESSURES = ("pressure_a", "pressure_b")
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """``channels`` recorded late (``way`` 1) or early (−1), or behind a low pass; ``text``: the fault in words."""
+    """``channels`` whose `Reading` is off in ``what``, to these ``ways`` (±1); ``text``: the fault in words."""
 
     name: str
     channels: tuple[str, ...]
-    low_pass: bool
+    what: Literal["delay", "lag", "gain"]
     ways: tuple[int, ...]
     text: str
     remedy: str
-    unit: str = "s"
+
+    @property
+    def unit(self) -> str:
+        """Of its size."""
+        return "1" if self.what == "gain" else "s"
+
+    def step(self, dt: float) -> float:
+        """What sizes are counted in: sampling intervals ``dt`` [s], or per cent."""
+        return PER_CENT if self.what == "gain" else dt
 
     def shown_by(self, channels: AbstractSet[str]) -> bool:
         """Whether records with these channels in all show it: no other hypothesis says the same of them."""
@@ -45,32 +56,38 @@ class Hypothesis:
         return len(seen) == len(self.channels) or (len(seen) > 1 and "position" in seen)
 
     def applied(self, segments: Segments, size: float) -> Segments:
-        """Segments whose record is taken to have a fault of this ``size`` [s]."""
-        found = list[Timing]()
-        for channel, timing in zip(segments.channels, segments.timing, strict=True):
+        """Segments whose record is taken to have a fault of this ``size`` [``unit``]."""
+        found = list[Reading]()
+        for channel, reading in zip(segments.channels, segments.readings, strict=True):
             if channel in self.channels:
-                if self.low_pass:
-                    timing = replace(timing, lag=max(timing.lag + size, 0.0))
+                if self.what == "lag":
+                    reading = replace(reading, lag=max(reading.lag + size, 0.0))
+                elif self.what == "gain":
+                    reading = replace(reading, gain=reading.gain + size)
                 else:
                     # The small delay that a channel may have without a name is part of the fault.
-                    timing = replace(timing, delay=timing.named + size, named=timing.named + size)
-            found.append(timing)
-        return replace(segments, timing=tuple(found))
+                    reading = replace(reading, delay=reading.named + size, named=reading.named + size)
+            found.append(reading)
+        return replace(segments, readings=tuple(found))
 
 
-# A position that is late, and a valve that is, are physics of the library (sensor_delay, sensor_lag, command_delay).
+# A position that is late or scaled, a valve that is late and pressures with an offset are physics of the library
+# (sensor_delay, sensor_lag, sensor_scale, command_delay, pressure_offset); one scale of both pressures is that of the
+# supply and the areas.
 HYPOTHESES = (
-    Hypothesis("pressures", PRESSURES, False, (1, -1), "the pressures were recorded {size} {late}",
+    Hypothesis("pressures", PRESSURES, "delay", (1, -1), "the pressures were recorded {size} {late}",
                "shift them, or sample all channels at one instant"),
-    Hypothesis("pressures_low_pass", PRESSURES, True, (1,), "the pressures went through a low pass of {corner}",
+    Hypothesis("pressures_low_pass", PRESSURES, "lag", (1,), "the pressures went through a low pass of {corner}",
                "take the filter out, or use faster transducers"),
-    *(Hypothesis(c, (c,), False, (1, -1), f"{c} was recorded {{size}} {{late}}",
+    *(Hypothesis(c, (c,), "delay", (1, -1), f"{c} was recorded {{size}} {{late}}",
                  "shift it, or sample all channels at one instant") for c in PRESSURES),
-    *(Hypothesis(f"{c}_low_pass", (c,), True, (1,), f"{c} went through a low pass of {{corner}}",
+    *(Hypothesis(f"{c}_low_pass", (c,), "lag", (1,), f"{c} went through a low pass of {{corner}}",
                  "take the filter out, or use a faster transducer") for c in PRESSURES),
-    Hypothesis("drive", ("position", *PRESSURES), False, (-1,), "the drive was recorded {size} late",
+    *(Hypothesis(f"{c}_gain", (c,), "gain", (1, -1), f"{c} reads {{size}} too {{much}}",
+                 "calibrate the transducer and its amplifier, or correct scale in the column map") for c in PRESSURES),
+    Hypothesis("drive", ("position", *PRESSURES), "delay", (-1,), "the drive was recorded {size} late",
                "record the drive at the instant at which it is put out"),
-    Hypothesis("position", ("position",), False, (-1,), "the position was recorded {size} early",
+    Hypothesis("position", ("position",), "delay", (-1,), "the position was recorded {size} early",
                "shift it, or sample all channels at one instant"),
 )  # fmt: skip
 
@@ -98,8 +115,12 @@ class RecordingFault:
 
     @property
     def linear(self) -> bool:
-        """Whether it is a disturbance of the drive rather than another timing of a channel."""
+        """Whether it is a disturbance of the drive rather than another reading of a channel."""
         return isinstance(self.hypothesis, DriveHypothesis)
+
+    def plain(self, dt: float) -> bool:
+        """Whether it is larger than what sound transducers and loggers with this sampling interval [s] do, too."""
+        return isinstance(self.hypothesis, DriveHypothesis) or abs(self.size) >= self.hypothesis.step(dt)
 
     @property
     def unit(self) -> str:
@@ -109,14 +130,17 @@ class RecordingFault:
     @property
     def text(self) -> str:
         """In words, with its size."""
-        late = "late" if self.size > 0.0 else "early"
+        late, much = ("late", "much") if self.size > 0.0 else ("early", "little")
         corner = f"{1.0 / (2.0 * np.pi * abs(self.size)):.3g} Hz" if self.unit == "s" and self.size else ""
-        size = f"{1e3 * abs(self.size):.3g} m{self.unit}"
-        return self.hypothesis.text.format(size=size, late=late, corner=corner)
+        size = percent(abs(self.size)) if self.unit == "1" else f"{1e3 * abs(self.size):.3g} m{self.unit}"
+        return self.hypothesis.text.format(size=size, late=late, much=much, corner=corner)
 
 
-def recording_faults(at: Linearisation) -> list[RecordingFault]:
-    """All that lower the sum of squares, the most promising first; sums are those of all segments for fitting."""
+def recording_faults(at: Linearisation, disturbances: bool = True) -> list[RecordingFault]:
+    """All that lower the sum of squares, the most promising first; sums are those of all segments for fitting.
+
+    ``disturbances``: whether those of the drive are tried, too.
+    """
     part, share = at.sample(ENOUGH)
     point = part.point
     runs = point.shooting.simulated(point.plant, point.initial_states)
@@ -129,7 +153,7 @@ def recording_faults(at: Linearisation) -> list[RecordingFault]:
             continue
         fault = _best(part, runs, hypothesis, before, share)
         found += [fault] if fault is not None else []
-    if not any(s.disturbance.shape[-1] for s in point.shooting.segments):
+    if disturbances and not any(s.disturbance.shape[-1] for s in point.shooting.segments):
         for one in DRIVE_HYPOTHESES:
             size = float(np.median([one.size(s) for s in at.split.segments]))
             if not size > 0.0:
@@ -172,14 +196,14 @@ def _best(
     share: float,
     begin: float | None = None,
 ) -> RecordingFault | None:
-    dt = min(s.record.dt for s in part.split.segments)
+    unit = hypothesis.step(min(s.record.dt for s in part.split.segments))
 
     def cost(size: float) -> float:
-        changed = [hypothesis.applied(s, size * dt) for s in part.point.shooting.segments]
+        changed = [hypothesis.applied(s, size * unit) for s in part.point.shooting.segments]
         every = zip(changed, runs, part.point.projections, strict=True)
         return _cost(part, [segments.deviation(run, p.raw) for segments, run, p in every])
 
-    sizes = [way * size for way in hypothesis.ways for size in TRIED] if begin is None else [begin / dt]
+    sizes = [way * size for way in hypothesis.ways for size in TRIED] if begin is None else [begin / unit]
     tried = {size: cost(size) for size in sizes}
     start = min(tried, key=lambda size: tried[size])
     if tried[start] >= before:
@@ -191,7 +215,7 @@ def _best(
     curvature = max((cost(size + step) - 2.0 * lowest + cost(size - step)) / step**2, 1e-12)
     variance = max(1.0, lowest / max(sum(int(s.counted.sum()) for s in part.split.segments), 1))
     error = float(np.sqrt(2.0 * variance * share / curvature))
-    return RecordingFault(hypothesis, size * dt, error * dt, (before - lowest) / share)
+    return RecordingFault(hypothesis, size * unit, error * unit, (before - lowest) / share)
 
 
 def _cost(part: Linearisation, raw: Sequence[Array]) -> float:

@@ -24,9 +24,9 @@ from hydraulic_sysid.estimation.parameters import bounded
 from hydraulic_sysid.estimation.refinement import refined, usable
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
-from .candidates import candidates, observed, subsystem
+from .candidates import candidates, delays, observed, subsystem
 from .competing_models import competing_models
-from .data_sheet import Deviation, priors, relaxed, restored, significant, suspects, with_error
+from .data_sheet import Deviation, HeldNumbers, least, priors, relaxed, restored, significant, stretched, with_error
 from .drive_faults import costs_with
 from .errors import DiagnosisError
 from .frozen_jacobian import Refit, as_it_is, refit
@@ -59,13 +59,15 @@ LOOSE = 1.03  # mean square over noise from which numbers of the data sheet are 
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
 SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
-SUSPECTS = 3  # numbers of the data sheet that are tried at once
+SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one
+CLEAR = 10.0  # times what names a number, beyond which a fit need not show what putting it back costs
 QUIETER = 0.95  # of the noise before: what was judged by that is judged again
 RETIMED = 0.1  # sampling intervals by which a channel is less late than before: the same
 MOST_FAULTS = 3  # of the recording
-UNNOTICED = 0.003  # of the motion in a segment: what leaves less is no fault of the recording
+UNNOTICED = 0.003  # of the motion in a segment: what leaves less is no disturbance of the drive
 MOST_SIZES = 4  # times that the size of a fault is sought again, …
 SAME_SIZE = 0.03  # … until it changes by no more than this share
+RIVAL = 0.8  # of what the best candidate explains, from which a fault of the recording may be in its place
 FAR_OFF = 4.0  # mean square over noise from which a fit need not be finished
 ROUNDS = 2  # of estimating the noise and fitting again
 NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing more is looked for
@@ -74,7 +76,7 @@ MOST_SWAPS = 3
 MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
 ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
 HOPELESS = 0.6  # of what noise does not explain: where less is explained, exchanging effects will not do either
-PROMISED = 0.5  # of what an effect must explain, or the best number, which must show for another to be fitted
+PROMISED = 0.5  # of what an effect must explain, or of what a number explains, which must show for a fit to its end
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
 LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
 
@@ -128,7 +130,7 @@ class SearchResult:
 
     ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
     ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the misfit
-    before any fault of the recording was assumed.
+    before any fault of the recording was assumed; ``faults_instead``: that explain what the one effect added does.
     """
 
     model: Model
@@ -140,6 +142,7 @@ class SearchResult:
     competing: dict[str, SearchState]
     moved: Sequence[Deviation] = ()
     faults: Sequence[RecordingFault] = ()
+    faults_instead: Sequence[RecordingFault] = ()
     as_recorded: Misfit | None = None
     stopped: bool = False
     """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""
@@ -190,6 +193,8 @@ class Search:
         self.given, self.split, self.short, self.settings = model, split, short, settings
         self.say = Progress(say, within)
         self.faults: list[RecordingFault] = []
+        self.rivals: list[RecordingFault] = []
+        """Other faults, that explain about as much as the best candidate."""
         self.path: list[SearchState] = []
         """The model and what it became with each effect added, as far as the search has come …"""
         self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
@@ -226,24 +231,31 @@ class Search:
         strict = self.judged(self.state(self.given, self._first))
         self.path = [strict]
         self.say.reached((), strict.misfit)
-        if strict.misfit.variance < LOOSE:
+        return self.loosened(strict)
+
+    def loosened(self, strict: SearchState) -> SearchState:
+        """A state with the data sheet relaxed, where that helps."""
+        if strict.misfit.variance < LOOSE or not self._strict(strict):
             return strict
         self.say("fitting the model within the tolerances of its data sheet")
         try:
-            loose = self.nearer(relaxed(strict.model), strict.misfit)
+            at_bound = strict.linearisation.parameters.at_bound
+            # What lies at its bound may be far beyond it.
+            far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
+            loose = self.nearer(relaxed(strict.model), far)
         except SimulationError:  # it went where the plant does not run
             return strict
         if material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER:
             return self.judged(loose)
         return strict
 
-    def nearer(self, model: Model, misfit: Misfit) -> SearchState:
-        """A model fitted: to the end only if it is near, or comes near from where ``misfit`` was left.
+    def nearer(self, model: Model, far: bool) -> SearchState:
+        """A model fitted: where it is ``far`` off, to the end only if it comes near.
 
         A resonance has many local minima. From far off the fit begins once more from where short segments lead: over
         few periods a wrong frequency is hardly a wrong phase.
         """
-        if misfit.variance < FAR_OFF:
+        if not far:
             return self.state(model, self._last)
         found = self.state(model, self._first)
         try:
@@ -281,17 +293,18 @@ class Search:
             self.path = [base]
             base = self.explore(base)
             left = remainders(self.split, base.residual)
-            if len(self.faults) == MOST_FAULTS or negligible(left, UNNOTICED):
+            if len(self.faults) == MOST_FAULTS:
                 break
             self.say("faults of the recording")
-            faults = recording_faults(base.linearisation)
-            if immaterial(base.misfit, left):
-                # A disturbance is free enough to take up what laws leave, the timing of a channel is not.
-                faults = [f for f in faults if not f.linear]
+            # A disturbance is free enough to take up what laws leave, the reading of a channel is not.
+            plain = not negligible(left, UNNOTICED) and not immaterial(base.misfit, left)
+            faults = recording_faults(base.linearisation, disturbances=plain)
             if base.misfit.little:  # filters of sound transducers delay by a part of a sampling interval, too
                 shortest = min(s.record.dt for s in self.split.segments)
-                faults = [f for f in faults if f.linear or abs(f.size) >= shortest]
+                faults = [f for f in faults if f.plain(shortest)]
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
+            enough = RIVAL * (base.misfit.fit - best)
+            self.rivals = [f for f in faults if not f.linear and f.reduction >= enough][:FULL]
             if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
                 break
             # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
@@ -303,8 +316,15 @@ class Search:
             self.as_recorded = self.as_recorded or base.misfit
             self.faults = together(self.faults, found.fault)
             self.split, self.path = found.split, [found.state]
-            base = self.judged(found.state)
+            base = self.loosened(self.judged(found.state))
         return base if base.scores else self.rounded(base)
+
+    def within_a_sample(self, tried: CandidateRefit) -> bool:
+        """Whether an effect only delays, by less than a sampling interval: sound sensors and loggers do so, too."""
+        effect = self.given.library[tried.name]
+        shortest = min(s.record.dt for s in self.split.segments)
+        sizes = [tried.refit.model.value(f"{effect.name}.{p.name}") for p in effect.parameters]
+        return delays(effect) and all(size < shortest for size in sizes)
 
     def rounded(self, base: SearchState) -> SearchState:
         """A state with refits of the effects whose size records show by themselves.
@@ -339,54 +359,81 @@ class Search:
     def concluded(self, found: SearchResult) -> SearchResult:
         """With the data sheet as it was given, but for the few numbers that the records show to be wrong."""
         base, final = found.base, found.final
-        if base.linearisation.parameters.keys == self.given.movable_keys():
+        if self._strict(base):
             return found
         self.say("fitting with the data sheet as it is")
         strict = self.state(restored(base.model, self.given, []), self._last)
         strict = replace(strict, refits=base.refits, scores=base.scores)
-        done = strict if final is base else self.state(restored(final.model, self.given, []), self._last)
-        moved: list[Deviation] = []
-        bare = done
-        while significant(done.misfit.total - final.misfit.total, final.misfit.count, final.misfit.variance):
-            named = [d.key for d in moved]
-            tried = []
-            promising = suspects(final.linearisation, self.given, named)[:SUSPECTS]
-            for suspect in [p for p in promising if p.cost >= PROMISED * promising[0].cost]:
-                self.say(f"fitting with another {suspect.key}")
-                state = self.state(restored(final.model, self.given, [*named, suspect.key]), self._last)
-                cost, value = done.misfit.total - state.misfit.total, state.model.value(suspect.key)
-                tried.append((state, replace(suspect, cost=cost, value=value)))
-            best, deviation = min(tried, key=lambda t: t[0].misfit.total, default=(done, None))
-            if deviation is None or not significant(deviation.cost, best.misfit.count, best.misfit.variance):
-                break
-            tied = [(s, d) for s, d in tried if d is not deviation and not _worse(s.misfit, best.misfit)]
-            others = tuple(with_error(d, parameter_errors(s.linearisation)) for s, d in tied)
-            deviation = replace(deviation, alternatives=others)
-            back = done
-            if not deviation.sure:
-                # Another number may say the same, or what the fit gained came from the others, which had stopped short.
-                back = self.state(restored(best.model, self.given, named), self._last)
-            if done.misfit.total - back.misfit.total < done.misfit.least:
-                moved, done = [*moved, deviation], best
-            else:
-                done = back
+        done, moved = self.fewest_moved(final, strict if final is base else None)
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
-            moved = [replace(d, instead=self.instead(bare, done, d, moved)) for d in moved]
+            moved = [replace(d, instead=self.instead(strict, done, d, moved)) for d in moved]
         misfits = found.misfits
         if misfits:
             misfits = {**misfits, next(reversed(misfits)): done.misfit}
         return replace(found, base=strict, final=done, misfits=misfits, moved=tuple(moved))
 
+    def fewest_moved(self, final: SearchState, strict: SearchState | None) -> tuple[SearchState, list[Deviation]]:
+        """The state in which as few numbers of the data sheet move as explain what all of them do, and these numbers.
+
+        ``final``: all are free; ``strict``: none is, where that is known.
+        """
+        held = HeldNumbers.of(final.linearisation, self.given)
+        count, variance = final.misfit.count, final.misfit.variance
+        enough = least(count, variance)
+        moved, done = held.keys, final
+        for moved in held.fewest(enough):
+            done = strict if strict is not None and not moved else self.with_moved(final, moved)
+            if not significant(done.misfit.total - final.misfit.total, count, variance):
+                break
+        for key in moved:
+            # Another number may say the same, or what a fit gained came from the others, which had stopped short.
+            deviation = self.deviation(held, key, moved, done)
+            if not deviation.sure and deviation.cost < CLEAR * enough:
+                others = tuple(k for k in moved if k != key)
+                back = self.with_moved(done, others)
+                if not significant(back.misfit.total - done.misfit.total, count, variance):
+                    moved, done = others, back
+        found = []
+        for key in moved:
+            same = []
+            for tied in held.instead(key, moved, enough)[:SUSPECTS]:
+                state = self.with_moved(final, tied)
+                if not _worse(state.misfit, done.misfit):
+                    same.append(self.deviation(held, tied[-1], tied, state))
+            found.append(replace(self.deviation(held, key, moved, done), alternatives=tuple(same)))
+        return done, found
+
+    def with_moved(self, state: SearchState, moved: Sequence[str]) -> SearchState:
+        """A state with the data sheet as it was given but for the numbers ``moved``."""
+        self.say(f"fitting with {' and '.join(['the data sheet as it is', *(f'another {key}' for key in moved)])}")
+        return self.state(restored(state.model, self.given, moved), self._last)
+
+    def deviation(self, held: HeldNumbers, key: str, moved: Sequence[str], state: SearchState) -> Deviation:
+        """One of the numbers ``moved`` in a state."""
+        others = [k for k in moved if k != key]
+        nominal = float(held.nominal[held.keys.index(key)])
+        found = Deviation(key, nominal, state.model.value(key), np.inf, held.cost(others) - held.cost(moved))
+        return with_error(found, parameter_errors(state.linearisation))
+
+    def set_against_faults(self, found: SearchResult) -> SearchResult:
+        """With the faults of the recording that explain what the one effect added does."""
+        if len(found.added) != 1:
+            return found
+        without = replace(found.final, model=found.final.model.without_effect(found.added[0]))
+        tried = [self.with_fault(without, fault) for fault in self.rivals]
+        same = [t.fault for t in tried if not _worse(t.state.misfit, found.final.misfit)]
+        return replace(found, faults_instead=tuple(same))
+
     def instead(
-        self, bare: SearchState, done: SearchState, deviation: Deviation, moved: Sequence[Deviation]
+        self, strict: SearchState, done: SearchState, deviation: Deviation, moved: Sequence[Deviation]
     ) -> tuple[str, ...]:
         """Effects that explain what another value of a number does, as far as these records can say.
 
-        ``bare``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
+        ``strict``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
         """
         self.say(f"fitting without another {deviation.key}")
         others = [d.key for d in moved if d.key != deviation.key]
-        without = self.state(restored(done.model, self.given, others), self._last) if others else bare
+        without = self.state(restored(done.model, self.given, others), self._last) if others else strict
         promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
         found = []
         for r in [r for r in self.explore(without, LATER_REFITS).refits if r.misfit.total < promising][:FULL]:
@@ -412,6 +459,10 @@ class Search:
         rounded = as_it_is(at, _with_values(model, at.model))
         return SearchState(rounded.model, at, misfit(self.split, rounded.costs), rounded.residual)
 
+    def _strict(self, base: SearchState) -> bool:
+        """Whether the data sheet is as it was given."""
+        return base.linearisation.parameters.keys == self.given.movable_keys()
+
     def _smooth(self, model: Model) -> Model:
         """Without effects that have no derivative."""
         for name in _observed(model):
@@ -435,6 +486,8 @@ class Search:
             self.say.reached(self._added(every[-1].refit.model), every[-1].misfit)
         pairs = zip(every, best, strict=True)
         refits = [r for r, s in pairs if not observed(s.effect) or base.misfit.total - r.misfit.total > least]
+        if base.misfit.little:
+            refits = [r for r in refits if not self.within_a_sample(r)]
         refits.sort(key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
 
@@ -479,7 +532,7 @@ class Search:
         :raises OutOfTimeError: before there was anything.
         """
         try:
-            return self.concluded(decisive(self.searched()))
+            return self.set_against_faults(self.concluded(decisive(self.searched())))
         except (OutOfTimeError, KeyboardInterrupt):
             if not self.path:
                 raise
@@ -669,7 +722,7 @@ def _worse(misfit: Misfit, best: Misfit) -> bool:
 
 
 def together(faults: Sequence[RecordingFault], found: RecordingFault) -> list[RecordingFault]:
-    """Faults with one more, which is more of the same where the same fault of a channel's timing was found before."""
+    """Faults with one more, which is more of the same where the same fault of a channel's reading was found before."""
     same = [f for f in faults if f.hypothesis is found.hypothesis and not f.linear]
     more = [replace(found, size=f.size + found.size, reduction=f.reduction + found.reduction) for f in same]
     return [*(f for f in faults if f not in same), *(more or [found])]
@@ -751,7 +804,7 @@ def retimed(before: Split, after: Split) -> bool:
     return any(
         abs(n.delay - o.delay) > RETIMED * new.record.dt
         for new, old in zip(after.segments, before.segments, strict=True)
-        for n, o in zip(new.timing, old.timing, strict=True)
+        for n, o in zip(new.readings, old.readings, strict=True)
     )
 
 

@@ -75,7 +75,7 @@ def conclusive(result: SearchResult) -> SearchResult:
     """
     vague = drive_unknown(result) and (result.base.misfit.variance < VAGUE or kind_of(result, tied=False) == OUTSIDE)
     if result.added and vague:
-        return replace(result, final=result.base, misfits={}, competing={})
+        return replace(result, final=result.base, misfits={}, competing={}, faults_instead=())
     return result
 
 
@@ -85,6 +85,7 @@ def judge(result: SearchResult) -> Verdict:
     competing = {name: competing_models(name, state, final) for name, state in result.competing.items()}
     family = families(result.model, result.added, result.split.channels)
     tied = bool(family) or any(not c.distinguishable for every in competing.values() for c in every)
+    tied = tied or bool(result.faults_instead)
     return Verdict(kind_of(result, tied), result.added, competing, family)
 
 
@@ -191,7 +192,8 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
             same = verdict.indistinguishable_from(name)
             parts.append(f"one of {{{', '.join([name, *same])}}}" if same else name)
         why = " Pressures would: without them these act alike on the position." if verdict.family else ""
-        return " ".join([f"Missing: {_and(parts)}. These data cannot distinguish them. {fell}{why}", *beside])
+        faults = "".join(f", or nothing is, and {f.text}" for f in result.faults_instead)
+        return " ".join([f"Missing: {_and(parts)}{faults}. These data cannot distinguish them. {fell}{why}", *beside])
     text = "Outside the library: no effect of it explains what is left. "
     if result.added:
         text += f"The nearest is {_and(result.added)}. {fell} "
