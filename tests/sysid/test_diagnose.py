@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,26 +11,20 @@ import pytest
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict
-from hydraulic_sysid.diagnosis.search import search as search_module
+from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict, worth
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
-from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, as_filed, relaxed
+from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, HeldNumbers, as_filed, relaxed
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
 from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError, Progress
+from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, RecordingFault
 from hydraulic_sysid.diagnosis.search.score_test import CandidateScore
-from hydraulic_sysid.diagnosis.search.search import (
-    CandidateRefit,
-    SearchResult,
-    SearchState,
-    absorbs_discrepancy,
-    decisive,
-    varied,
-    without_competitor,
-)
+from hydraulic_sysid.diagnosis.search.search import varied
+from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
 from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
+from hydraulic_sysid.diagnosis.search.worth import absorbs_discrepancy, decisive, without_competitor
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise import code_step
 from hydraulic_sysid.estimation.parameters import bounded, scale
@@ -197,7 +192,7 @@ def test_a_small_further_effect_that_may_be_anything_is_not_named(
     base, before = state(model, 3000 * 5.0, {}), state(one, 3000 * without, {})
     final = state(one.with_effect("external_leakage"), 3000 * 1.1, {})
     rival = CompetingModel(other, one, before.misfit, 0.0, distinguishable, 1.0)
-    monkeypatch.setattr(search_module, "competing_models", lambda name, state, misfit: [rival])
+    monkeypatch.setattr(worth, "competing_models", lambda name, state, misfit: [rival])
     misfits = {"stribeck_friction": before.misfit, "external_leakage": final.misfit}
     found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {"external_leakage": before})
     kept = decisive(found)
@@ -273,6 +268,43 @@ def test_what_a_fault_of_the_recording_explains_is_explained(model) -> None:
 def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:
     assert not Deviation("dead_volume_a", 200e-6, 202e-6, 2.1e-6, 2000.0).sure
     assert Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0).sure
+
+
+def test_a_fault_of_the_recording_that_explains_the_same_is_named_beside_the_effect(model) -> None:
+    gain = next(h for h in HYPOTHESES if h.name == "pressure_a_gain")
+    base, final = state(model, 3000 * 4.0, {}), state(model.with_effect("pressure_offset"), 3000.0, {})
+    fault = RecordingFault(gain, 0.05, 1e-3, 9000.0)
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"pressure_offset": final.misfit}, {})
+    assert verdict.judge(found).kind == verdict.MISSING
+    found = replace(found, faults_instead=[fault])
+    judged = verdict.judge(found)
+    assert judged.kind == verdict.INDISTINGUISHABLE and judged.possible == ["pressure_offset"]
+    said = verdict.sentences(found, judged, [])
+    assert said.startswith("Missing: pressure_offset, or nothing is, and pressure_a reads 5.0 % too much. These data")
+
+
+def held_numbers(off: Sequence[float], correlation: float = 0.0) -> HeldNumbers:
+    """Numbers a, b, …, so many standard errors off what the file says, two neighbours correlated."""
+    cover = np.eye(len(off))
+    cover[0, 1] = cover[1, 0] = correlation
+    return HeldNumbers(tuple("abc"[: len(off)]), np.array(off), np.zeros(len(off)), cover)
+
+
+def test_no_more_numbers_move_than_have_to() -> None:
+    held = held_numbers([30.0, 1.0, 12.0])
+    assert held.cost(["a", "b", "c"]) == 0.0 and held.cost(["a"]) == pytest.approx(1.0 + 144.0)
+    assert next(held.fewest(200.0)) == ("a",)
+    assert list(held.fewest(100.0)) == [("a", "c"), ("a", "b", "c")]
+    assert list(held_numbers([1.0, 1.0]).fewest(100.0))[0] == ()
+
+
+def test_of_numbers_that_say_the_same_either_may_move() -> None:
+    """Only their difference is known well, as of two areas with the valve's flow free."""
+    held = held_numbers([3.0, -3.0], correlation=0.999)
+    assert held.cost([]) == pytest.approx(18e3)
+    assert next(held.fewest(100.0)) == ("a",)
+    assert held.instead("a", ["a"], 100.0) == [("b",)]
+    assert held_numbers([30.0, 1.0]).instead("a", ["a"], 100.0) == []
 
 
 def test_numbers_that_explain_the_same_are_all_named(model) -> None:

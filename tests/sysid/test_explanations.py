@@ -131,6 +131,16 @@ def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> Non
     assert_cannot_inject(found)
 
 
+def test_a_transducer_that_reads_too_much_is_a_matter_of_the_recording(model: Model, runs) -> None:
+    scaled = [{**run, "pressure_b": 1.03 * run["pressure_b"]} for run in runs]
+    found = document(diagnose(model, records(scaled)))
+    assert found["verdict"]["kind"] == "recording", found["verdict"]["text"]
+    (fault,) = found["recording"]["faults"]
+    assert fault["name"] == "pressure_b_gain" and fault["unit"] == "1"
+    assert fault["size"] == pytest.approx(0.03, rel=0.1)
+    assert "pressure_b reads 3.0 % too much: calibrate the transducer" in found["verdict"]["text"]
+
+
 def test_spikes_are_counted_and_do_not_count(model: Model, runs) -> None:
     spoiled = []
     for record in records(runs):

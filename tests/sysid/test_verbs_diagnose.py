@@ -100,6 +100,13 @@ FAULT = {
     "remedy": "mend it",
 }
 SPIKES = {"channel": "pressure_a", "count": 3, "share": 1e-3, "places": [{"record": "steps", "time": 1.5}]}
+GAIN = {
+    "faults": [],
+    "instead": [{"text": "pressure_a reads 5 % too much", "remedy": "calibrate it"}],
+    "spikes": [],
+    "set_aside": [],
+    "mains_lines": {},
+}
 RECORDING = {"recording": {"faults": [FAULT], "spikes": [SPIKES], "mains_lines": {"pressure_a": [50.0]}}}
 OUTSIDE = {"nonparametric_curves": [CURVE], "nearest_effects": ["backlash"]}
 PROPOSED = {
@@ -130,6 +137,7 @@ PROPOSED = {
             "Add stribeck_friction to the model first; add &#39;/tmp/own effect.py&#39;",
         ),
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
+        ("indistinguishable", {"recording": GAIN}, "Look whether pressure_a reads 5 % too much: calibrate it."),
         ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
         ("undecided", {}, "Let it search to its end; The error falls"),
         ("complete", {"check": [CONTRADICTION]}, "First: The travel is too long. Mend the stroke."),

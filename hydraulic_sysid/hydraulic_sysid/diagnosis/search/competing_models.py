@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from hydraulic_sim.plant import Plant
 
 from .linearisation import Linearisation
 from .misfit import Misfit
-
-if TYPE_CHECKING:
-    from .search import SearchState
+from .search_state import SearchState
 
 DISTINCT = 30.0  # difference of the sums of squares, of the variance, that distinguishes two models …
 LAW = 0.05  # … beside this share of what the better one leaves: no law is quite that of the bench

@@ -22,8 +22,10 @@ from .document import document, with_balances
 from .linearisation import Linearisation
 from .misfit import explained
 from .nonparametric_curves import NonparametricCurve, nonparametric_curves
-from .search import HOPELESS, Search, SearchResult
+from .search import Search
+from .search_state import SearchResult
 from .uncertainty import Known, parameter_errors
+from .worth import HOPELESS
 
 BALANCED = 40.0  # s of all records together of which balances are formed, …
 SHORT = 4.0  # … and at least of each

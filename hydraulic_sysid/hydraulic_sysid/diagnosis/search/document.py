@@ -17,7 +17,7 @@ from .holdout import BLOCK, EVERY
 from .misfit import UNSEEN, Misfit
 from .nonparametric_curves import NonparametricCurve
 from .recording_faults import RecordingFault
-from .search import SearchResult
+from .search_state import SearchResult
 from .uncertainty import Known
 from .verdict import MISSING, OUTSIDE, UNDECIDED, Verdict
 from .worst_segments import worst_segments

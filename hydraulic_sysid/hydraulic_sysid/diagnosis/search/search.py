@@ -8,8 +8,8 @@ Then every effect added is set against what would take its place, so that a prox
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -25,21 +25,34 @@ from hydraulic_sysid.estimation.refinement import refined, usable
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
 from .candidates import candidates, delays, observed, subsystem
-from .competing_models import competing_models
 from .data_sheet import Deviation, HeldNumbers, least, priors, relaxed, restored, significant, stretched, with_error
 from .drive_faults import costs_with
 from .errors import DiagnosisError
-from .frozen_jacobian import Refit, as_it_is, refit
+from .frozen_jacobian import as_it_is, refit
 from .holdout import Split, split
 from .linearisation import Linearisation
-from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material, misfit, unexplained_share
+from .misfit import Misfit, explained, material, misfit
 from .progress import OutOfTimeError, Progress
 from .recording_faults import RecordingFault, recording_faults, resized
-from .remainder import Remainder, Spikes, immaterial, negligible, remainders, spikes
+from .remainder import immaterial, negligible, remainders
 from .score_test import CandidateScore, score
+from .search_state import CandidateRefit, FaultFit, SearchResult, SearchState
 from .spectral_lines import record_features
 from .uncertainty import parameter_errors
-from .whiteness import Whiteness, whiteness
+from .worth import (
+    FAR,
+    FURTHER,
+    MOSTLY,
+    NOTHING_LEFT,
+    Enough,
+    anything,
+    decisive,
+    enough_at_first,
+    near_competitors,
+    superfluous,
+    without_competitor,
+    worth_adding,
+)
 
 PROMISING = 0.04  # of the best predicted reduction, from which a candidate is refitted
 MOST_REFITS = 8
@@ -47,14 +60,7 @@ LATER_REFITS = 4  # once something was added, …
 ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
 FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
 NEAR = 0.93  # of the best reduction, from which a refit is finished, …
-FAR = 5.0  # … if it leaves no more than so many times what the best leaves
 MOST_EFFECTS = 3
-FURTHER = 0.25  # of what is left, which a further effect must explain, unless it explains a good part of all
-NEEDED = 0.02  # of all that was explained, which an effect must explain beside the others to stay
-SUBORDINATE = 0.1  # of all that was explained, below which a further effect must be told apart to be named
-LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
-ELSEWHERE = 0.0005  # … and for those of other subsystems
-DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
 LOOSE = 1.03  # mean square over noise from which numbers of the data sheet are tried at all
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
 SHORTER = 4  # times: segments from which a fit that is far off begins once more
@@ -70,112 +76,12 @@ SAME_SIZE = 0.03  # … until it changes by no more than this share
 RIVAL = 0.8  # of what the best candidate explains, from which a fault of the recording may be in its place
 FAR_OFF = 4.0  # mean square over noise from which a fit need not be finished
 ROUNDS = 2  # of estimating the noise and fitting again
-NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing more is looked for
-EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
 MOST_SWAPS = 3
-MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
-ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
-HOPELESS = 0.6  # of what noise does not explain: where less is explained, exchanging effects will not do either
 PROMISED = 0.5  # of what an effect must explain, or of what a number explains, which must show for a fit to its end
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
 LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
 
 Say = Callable[[str], None]
-Enough = Callable[[str, Misfit, float], bool]
-
-
-@dataclass(frozen=True)
-class CandidateRefit:
-    """A candidate, refitted beside the effects that are on."""
-
-    name: str
-    refit: Refit
-    misfit: Misfit
-
-
-@dataclass(frozen=True)
-class SearchState:
-    """A model with some effects, fitted, and the candidates refitted on top of it, best first.
-
-    ``linearisation`` has no effects that records show by themselves: such as rounding have no derivative, and ``model``
-    and ``misfit`` are with them, the parameters as they are without; ``residual`` (S, m) per record is what ``model``
-    leaves.
-    """
-
-    model: Model
-    linearisation: Linearisation
-    misfit: Misfit
-    residual: Sequence[Array]
-    refits: list[CandidateRefit] = field(default_factory=list)
-    scores: list[CandidateScore] = field(default_factory=list)
-
-    def others(self, name: str) -> list[CandidateRefit]:
-        """The refits with another effect than this one."""
-        return [r for r in self.refits if r.name != name]
-
-
-@dataclass(frozen=True)
-class FaultFit:
-    """A state on records that are taken to have a fault, and its misfit with what the fault's freedom is worth."""
-
-    fault: RecordingFault
-    state: SearchState
-    split: Split
-    misfit: Misfit
-
-
-@dataclass(frozen=True)
-class SearchResult:
-    """Where a search ended.
-
-    ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
-    ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the misfit
-    before any fault of the recording was assumed; ``faults_instead``: that explain what the one effect added does.
-    """
-
-    model: Model
-    split: Split
-    settings: FitSettings
-    base: SearchState
-    final: SearchState
-    misfits: dict[str, Misfit]
-    competing: dict[str, SearchState]
-    moved: Sequence[Deviation] = ()
-    faults: Sequence[RecordingFault] = ()
-    faults_instead: Sequence[RecordingFault] = ()
-    as_recorded: Misfit | None = None
-    stopped: bool = False
-    """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""
-
-    @property
-    def before(self) -> Misfit:
-        """What the model left before anything was explained."""
-        return self.as_recorded or self.base.misfit
-
-    @property
-    def unexplained_share(self) -> float:
-        """What is left in the end, of what was there before anything was explained (0…1)."""
-        return unexplained_share(self.before, self.final.misfit)
-
-    @property
-    def added(self) -> list[str]:
-        """Effects, the one that explains most first."""
-        return list(self.misfits)
-
-    @cached_property
-    def remainders(self) -> list[Remainder]:
-        """What is left in the end, in the units of the sensors."""
-        return remainders(self.split, self.final.residual)
-
-    @cached_property
-    def whiteness(self) -> list[Whiteness]:
-        """Of what is left in the end."""
-        return whiteness(self.split, self.final.residual)
-
-    @cached_property
-    def spikes(self) -> list[Spikes]:
-        """Samples that do not count."""
-        return spikes(self.split)
 
 
 class Search:
@@ -416,12 +322,25 @@ class Search:
         return with_error(found, parameter_errors(state.linearisation))
 
     def set_against_faults(self, found: SearchResult) -> SearchResult:
-        """With the faults of the recording that explain what the one effect added does."""
+        """With the faults of the recording that explain what the one effect added does.
+
+        One that explains by itself what takes the effect and other numbers of the data sheet is the simpler answer.
+        """
         if len(found.added) != 1:
             return found
-        without = replace(found.final, model=found.final.model.without_effect(found.added[0]))
-        tried = [self.with_fault(without, fault) for fault in self.rivals]
-        same = [t.fault for t in tried if not _worse(t.state.misfit, found.final.misfit)]
+        final, same = found.final, list[RecordingFault]()
+        model = final.model.without_effect(found.added[0])
+        plain = restored(model, self.given, [])
+        for fault in self.rivals:
+            tried = self.with_fault(replace(final, model=plain), fault)
+            if not _worse(tried.state.misfit, final.misfit) and found.moved:
+                faults, before = (*found.faults, tried.fault), found.as_recorded or found.base.misfit
+                found = replace(found, split=tried.split, final=tried.state, faults=faults, as_recorded=before)
+                return replace(found, base=tried.state, misfits={}, competing={}, moved=())
+            if found.moved:
+                tried = self.with_fault(replace(final, model=model), fault)
+            if not _worse(tried.state.misfit, final.misfit):
+                same.append(tried.fault)
         return replace(found, faults_instead=tuple(same))
 
     def instead(
@@ -545,7 +464,7 @@ class Search:
         self.split = path[-1].linearisation.split  # the end may have come while the records were judged anew
         if on is not None and on.linearisation.split is self.split and on.model.effects == path[-1].model.effects:
             nearest = sorted(refits, key=lambda r: r.misfit.total)[:1]
-            better = self.finish(replace(path[-1], refits=nearest), _anything)
+            better = self.finish(replace(path[-1], refits=nearest), anything)
             path += [better] if better is not None else []
         names = [_new(state, former) for former, state in zip(path, path[1:], strict=False)]
         misfits = {name: state.misfit for name, state in zip(names, path[1:], strict=True)}
@@ -576,7 +495,9 @@ class Search:
             added = [e for e in known.model.effects if e not in base.model.effects]
             path.append(self.explore(known, most=LATER_REFITS) if known.misfit.variance - 1.0 > NOTHING_LEFT else known)
         while len(added) < MOST_EFFECTS:
-            better = self.finish(path[-1], partial(_worth, base, path[-1], added) if added else partial(_enough, base))
+            better = self.finish(
+                path[-1], partial(worth_adding, base, path[-1], added) if added else partial(enough_at_first, base)
+            )
             if better is not None and not added:
                 # The fit with an effect may have gone on where that without it had stopped.
                 plain = self.state(better.model.without_effect(_new(better, base)), self._last)
@@ -643,7 +564,7 @@ class Search:
                 without = self.state(state.model.without_effect(name), self._last)
             except SimulationError:  # with these values the model does not run without it
                 continue
-            if _superfluous(base, without, state, name, others):
+            if superfluous(base, without, state, name, others):
                 self.say(f"leaving out {name}")
                 added, state, competing, queue = others, without, {}, others
                 continue
@@ -651,8 +572,8 @@ class Search:
                 continue
             without = self.explore(without, most=LATER_REFITS)
             competing = {**competing, name: without}
-            near = _near(base, without, state, name)
-            other = self.finish(near, _anything) if swaps < MOST_SWAPS else None
+            near = near_competitors(base, without, state, name)
+            other = self.finish(near, anything) if swaps < MOST_SWAPS else None
             if other is not None and state.misfit.total - other.misfit.total > state.misfit.least:
                 new = _new(other, without)
                 self.say(f"{new} in the place of {name}")
@@ -676,46 +597,6 @@ class Search:
         return {**found, **{name: final.misfit for name in order[-1:]}}
 
 
-def decisive(found: SearchResult) -> SearchResult:
-    """A search without the effects that its data do not name.
-
-    None where so little was left that nothing need be missing, and they leave much of that; no further one without
-    which nothing is left either, and none that explains little and may as well be something of another subsystem: that
-    is how far laws are off those of the bench.
-    """
-    base, final = found.base.misfit, found.final.misfit
-    if found.added and base.little and final.variance - 1.0 > SMALL_UNEXPLAINED * (base.variance - 1.0):
-        return replace(found, final=found.base, misfits={}, competing={})
-    for name in reversed(found.added[1:]):
-        if needless(found, name) or vague(found, name):
-            misfits = {other: misfit for other, misfit in found.misfits.items() if other != name}
-            competing = {other: state for other, state in found.competing.items() if other != name}
-            without = found.competing[name]
-            misfits[next(reversed(misfits))] = without.misfit
-            return decisive(replace(found, final=without, misfits=misfits, competing=competing))
-    return found
-
-
-def needless(found: SearchResult, name: str) -> bool:
-    """Whether nothing is left without an effect, either; what the records show by themselves is there all the same."""
-    without = found.competing.get(name)
-    if without is None or without is found.base or observed(found.model.library[name]):
-        return False
-    return without.misfit.variance - 1.0 < NOTHING_LEFT
-
-
-def vague(found: SearchResult, name: str) -> bool:
-    """Whether an effect explains little of all, and no more than something of another subsystem would."""
-    base, final, library = found.base.misfit, found.final.misfit, found.model.library
-    without = found.competing.get(name)
-    if without is None or without is found.base:
-        return False
-    share = (without.misfit.total - final.total) / max(base.total - final.total, 1e-9)
-    others = [c.name for c in competing_models(name, without, final) if not c.distinguishable]
-    own = subsystem(library[name])
-    return share < SUBORDINATE and any(subsystem(library[other]) != own for other in others)
-
-
 def _worse(misfit: Misfit, best: Misfit) -> bool:
     """Whether a model is significantly worse than another."""
     return significant(misfit.total - best.total, misfit.count, misfit.variance)
@@ -736,52 +617,6 @@ def _observed(model: Model) -> list[str]:
 def _with_values(model: Model, fitted: Model) -> Model:
     """The model with what was fitted in one that lacks some of its effects."""
     return model.with_values({k: fitted.value(k) for k in fitted.movable_keys()}, source="fitted")
-
-
-def _worth(base: SearchState, before: SearchState, added: Sequence[str], name: str, after: Misfit, part: float) -> bool:
-    """Whether a further effect explains enough (times ``part``).
-
-    That is a good part of what is left, or something of what there was, where the others explain most of it. What
-    explains little where most is left would be a proxy.
-    """
-    if absorbs_discrepancy(base, before, added, name, after, part):
-        return False
-    if explained(before.misfit, after) >= part * FURTHER:
-        return True
-    most = explained(base.misfit, before.misfit) >= HOPELESS
-    return most and explained(base.misfit, after) - explained(base.misfit, before.misfit) >= part * NEEDED
-
-
-def absorbs_discrepancy(
-    base: SearchState, before: SearchState, others: Sequence[str], name: str, after: Misfit, part: float = 1.0
-) -> bool:
-    """Whether an effect explains so little of all that it may only absorb the discrepancy of the others' laws.
-
-    One of another subsystem that explains most of what is left is believed.
-    """
-    library = base.model.library
-    alike = any(subsystem(library[name]) == subsystem(library[other]) for other in others)
-    if not alike and explained(before.misfit, after) >= part * HOPELESS:
-        return False
-    least = part * (LAW if alike else ELSEWHERE)
-    return before.misfit.total - after.total < least * (base.misfit.total - after.total)
-
-
-def _superfluous(base: SearchState, without: SearchState, state: SearchState, name: str, others: Sequence[str]) -> bool:
-    """Whether ``state`` is hardly better than ``without`` the effect."""
-    if not material(without.misfit, state.misfit) or absorbs_discrepancy(base, without, others, name, state.misfit):
-        return True
-    lost = without.misfit.total - state.misfit.total
-    needed = NEEDED * (base.misfit.total - state.misfit.total)
-    return explained(without.misfit, state.misfit) < FURTHER and lost < needed
-
-
-def _near(base: SearchState, without: SearchState, state: SearchState, name: str) -> SearchState:
-    """The state ``without`` an effect, and of its refits those that come near the state with it."""
-    left = state.misfit.excess + DISTANT * (without.misfit.total - state.misfit.total)
-    if explained(base.misfit, state.misfit) < HOPELESS:
-        return replace(without, refits=[])
-    return replace(without, refits=[r for r in without.others(name) if r.misfit.excess < left])
 
 
 def quieter(before: Split, after: Split) -> bool:
@@ -808,34 +643,10 @@ def retimed(before: Split, after: Split) -> bool:
     )
 
 
-def _enough(base: SearchState, name: str, after: Misfit, part: float) -> bool:
-    """Whether a first effect explains a good part of what the model, within its tolerances, leaves."""
-    return explained(base.misfit, after) >= part * FURTHER
-
-
-def _anything(name: str, after: Misfit, part: float) -> bool:
-    """No more is asked than that a reduction is one."""
-    return True
-
-
 def varied(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
     """In their order, and no more than so many of one subsystem."""
     places = [subsystem(f.effect) for f in found]
     return [f for i, f in enumerate(found) if places[:i].count(places[i]) < most]
-
-
-def without_competitor(base: SearchState, final: SearchState, name: str) -> bool:
-    """Whether an effect explains by itself most of what is off, and no other candidate comes near it.
-
-    That is judged by what they explain or, where in the end all is explained, by what they leave.
-    """
-    own = next((r.misfit for r in base.refits if r.name == name), None)
-    if own is None or base.misfit.total - own.total < MOSTLY * base.misfit.excess:
-        return False
-    others = [r.misfit for r in base.others(name)]
-    alone = all(base.misfit.total - at.total < ALONE * (base.misfit.total - own.total) for at in others)
-    little = final.misfit.variance - 1.0 < EXPLAINED
-    return alone or (little and all(at.excess > FAR * (own.excess + at.least) for at in others))
 
 
 def _new(state: SearchState, before: SearchState) -> str:

@@ -19,7 +19,7 @@ from .drive_faults import DriveHypothesis
 from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
 from .remainder import Remainder, immaterial
-from .search import SearchResult
+from .search_state import SearchResult
 from .set_aside import SATURATED, SetAside
 from .whiteness import Whiteness
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .search import SearchResult
+from .search_state import SearchResult
 
 MOST = 4
 

@@ -1,0 +1,115 @@
+"""Where a search stands, what was tried on top of it, and where it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from hydraulic_sim.arrays import Array
+from hydraulic_sim.model import Model
+from hydraulic_sysid.estimation.fit import FitSettings
+
+from .data_sheet import Deviation
+from .frozen_jacobian import Refit
+from .holdout import Split
+from .linearisation import Linearisation
+from .misfit import Misfit, unexplained_share
+from .recording_faults import RecordingFault
+from .remainder import Remainder, Spikes, remainders, spikes
+from .score_test import CandidateScore
+from .whiteness import Whiteness, whiteness
+
+
+@dataclass(frozen=True)
+class CandidateRefit:
+    """A candidate, refitted beside the effects that are on."""
+
+    name: str
+    refit: Refit
+    misfit: Misfit
+
+
+@dataclass(frozen=True)
+class SearchState:
+    """A model with some effects, fitted, and the candidates refitted on top of it, best first.
+
+    ``linearisation`` has no effects that records show by themselves: such as rounding have no derivative, and ``model``
+    and ``misfit`` are with them, the parameters as they are without; ``residual`` (S, m) per record is what ``model``
+    leaves.
+    """
+
+    model: Model
+    linearisation: Linearisation
+    misfit: Misfit
+    residual: Sequence[Array]
+    refits: list[CandidateRefit] = field(default_factory=list)
+    scores: list[CandidateScore] = field(default_factory=list)
+
+    def others(self, name: str) -> list[CandidateRefit]:
+        """The refits with another effect than this one."""
+        return [r for r in self.refits if r.name != name]
+
+
+@dataclass(frozen=True)
+class FaultFit:
+    """A state on records that are taken to have a fault, and its misfit with what the fault's freedom is worth."""
+
+    fault: RecordingFault
+    state: SearchState
+    split: Split
+    misfit: Misfit
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """Where a search ended.
+
+    ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
+    ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the misfit
+    before any fault of the recording was assumed; ``faults_instead``: that explain what the one effect added does.
+    """
+
+    model: Model
+    split: Split
+    settings: FitSettings
+    base: SearchState
+    final: SearchState
+    misfits: dict[str, Misfit]
+    competing: dict[str, SearchState]
+    moved: Sequence[Deviation] = ()
+    faults: Sequence[RecordingFault] = ()
+    faults_instead: Sequence[RecordingFault] = ()
+    as_recorded: Misfit | None = None
+    stopped: bool = False
+    """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""
+
+    @property
+    def before(self) -> Misfit:
+        """What the model left before anything was explained."""
+        return self.as_recorded or self.base.misfit
+
+    @property
+    def unexplained_share(self) -> float:
+        """What is left in the end, of what was there before anything was explained (0…1)."""
+        return unexplained_share(self.before, self.final.misfit)
+
+    @property
+    def added(self) -> list[str]:
+        """Effects, the one that explains most first."""
+        return list(self.misfits)
+
+    @cached_property
+    def remainders(self) -> list[Remainder]:
+        """What is left in the end, in the units of the sensors."""
+        return remainders(self.split, self.final.residual)
+
+    @cached_property
+    def whiteness(self) -> list[Whiteness]:
+        """Of what is left in the end."""
+        return whiteness(self.split, self.final.residual)
+
+    @cached_property
+    def spikes(self) -> list[Spikes]:
+        """Samples that do not count."""
+        return spikes(self.split)

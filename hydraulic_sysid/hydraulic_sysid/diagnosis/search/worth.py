@@ -1,0 +1,138 @@
+"""Whether an effect is worth its place: what it must explain, beside which others, and what makes it superfluous."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from .candidates import observed, subsystem
+from .competing_models import competing_models
+from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material
+from .search_state import SearchResult, SearchState
+
+FAR = 5.0  # … if it leaves no more than so many times what the best leaves
+FURTHER = 0.25  # of what is left, which a further effect must explain, unless it explains a good part of all
+NEEDED = 0.02  # of all that was explained, which an effect must explain beside the others to stay
+SUBORDINATE = 0.1  # of all that was explained, below which a further effect must be told apart to be named
+LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
+ELSEWHERE = 0.0005  # … and for those of other subsystems
+DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
+NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing more is looked for
+EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
+MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
+ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
+HOPELESS = 0.6  # of what noise does not explain: where less is explained, exchanging effects will not do either
+
+Enough = Callable[[str, Misfit, float], bool]
+
+
+def enough_at_first(base: SearchState, name: str, after: Misfit, part: float) -> bool:
+    """Whether a first effect explains a good part of what the model, within its tolerances, leaves."""
+    return explained(base.misfit, after) >= part * FURTHER
+
+
+def worth_adding(
+    base: SearchState, before: SearchState, added: Sequence[str], name: str, after: Misfit, part: float
+) -> bool:
+    """Whether a further effect explains enough (times ``part``).
+
+    That is a good part of what is left, or something of what there was, where the others explain most of it. What
+    explains little where most is left would be a proxy.
+    """
+    if absorbs_discrepancy(base, before, added, name, after, part):
+        return False
+    if explained(before.misfit, after) >= part * FURTHER:
+        return True
+    most = explained(base.misfit, before.misfit) >= HOPELESS
+    return most and explained(base.misfit, after) - explained(base.misfit, before.misfit) >= part * NEEDED
+
+
+def absorbs_discrepancy(
+    base: SearchState, before: SearchState, others: Sequence[str], name: str, after: Misfit, part: float = 1.0
+) -> bool:
+    """Whether an effect explains so little of all that it may only absorb the discrepancy of the others' laws.
+
+    One of another subsystem that explains most of what is left is believed.
+    """
+    library = base.model.library
+    alike = any(subsystem(library[name]) == subsystem(library[other]) for other in others)
+    if not alike and explained(before.misfit, after) >= part * HOPELESS:
+        return False
+    least = part * (LAW if alike else ELSEWHERE)
+    return before.misfit.total - after.total < least * (base.misfit.total - after.total)
+
+
+def superfluous(base: SearchState, without: SearchState, state: SearchState, name: str, others: Sequence[str]) -> bool:
+    """Whether ``state`` is hardly better than ``without`` the effect."""
+    if not material(without.misfit, state.misfit) or absorbs_discrepancy(base, without, others, name, state.misfit):
+        return True
+    lost = without.misfit.total - state.misfit.total
+    needed = NEEDED * (base.misfit.total - state.misfit.total)
+    return explained(without.misfit, state.misfit) < FURTHER and lost < needed
+
+
+def near_competitors(base: SearchState, without: SearchState, state: SearchState, name: str) -> SearchState:
+    """The state ``without`` an effect, and of its refits those that come near the state with it."""
+    left = state.misfit.excess + DISTANT * (without.misfit.total - state.misfit.total)
+    if explained(base.misfit, state.misfit) < HOPELESS:
+        return replace(without, refits=[])
+    return replace(without, refits=[r for r in without.others(name) if r.misfit.excess < left])
+
+
+def without_competitor(base: SearchState, final: SearchState, name: str) -> bool:
+    """Whether an effect explains by itself most of what is off, and no other candidate comes near it.
+
+    That is judged by what they explain or, where in the end all is explained, by what they leave.
+    """
+    own = next((r.misfit for r in base.refits if r.name == name), None)
+    if own is None or base.misfit.total - own.total < MOSTLY * base.misfit.excess:
+        return False
+    others = [r.misfit for r in base.others(name)]
+    alone = all(base.misfit.total - at.total < ALONE * (base.misfit.total - own.total) for at in others)
+    little = final.misfit.variance - 1.0 < EXPLAINED
+    return alone or (little and all(at.excess > FAR * (own.excess + at.least) for at in others))
+
+
+def anything(name: str, after: Misfit, part: float) -> bool:
+    """No more is asked than that a reduction is one."""
+    return True
+
+
+def decisive(found: SearchResult) -> SearchResult:
+    """A search without the effects that its data do not name.
+
+    None where so little was left that nothing need be missing, and they leave much of that; no further one without
+    which nothing is left either, and none that explains little and may as well be something of another subsystem: that
+    is how far laws are off those of the bench.
+    """
+    base, final = found.base.misfit, found.final.misfit
+    if found.added and base.little and final.variance - 1.0 > SMALL_UNEXPLAINED * (base.variance - 1.0):
+        return replace(found, final=found.base, misfits={}, competing={})
+    for name in reversed(found.added[1:]):
+        if needless(found, name) or vague(found, name):
+            misfits = {other: misfit for other, misfit in found.misfits.items() if other != name}
+            competing = {other: state for other, state in found.competing.items() if other != name}
+            without = found.competing[name]
+            misfits[next(reversed(misfits))] = without.misfit
+            return decisive(replace(found, final=without, misfits=misfits, competing=competing))
+    return found
+
+
+def needless(found: SearchResult, name: str) -> bool:
+    """Whether nothing is left without an effect, either; what the records show by themselves is there all the same."""
+    without = found.competing.get(name)
+    if without is None or without is found.base or observed(found.model.library[name]):
+        return False
+    return without.misfit.variance - 1.0 < NOTHING_LEFT
+
+
+def vague(found: SearchResult, name: str) -> bool:
+    """Whether an effect explains little of all, and no more than something of another subsystem would."""
+    base, final, library = found.base.misfit, found.final.misfit, found.model.library
+    without = found.competing.get(name)
+    if without is None or without is found.base:
+        return False
+    share = (without.misfit.total - final.total) / max(base.total - final.total, 1e-9)
+    others = [c.name for c in competing_models(name, without, final) if not c.distinguishable]
+    own = subsystem(library[name])
+    return share < SUBORDINATE and any(subsystem(library[other]) != own for other in others)
