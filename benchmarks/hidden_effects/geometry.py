@@ -181,7 +181,7 @@ _EVERY = (
                  "stop_stiffness": 2e8, "stop_damping": 200.0},
              pressures=False,
              never=("entrained_air", "sensor_offset", "pressure_offset", "supply_pressure", "dead_volume_a",
-                    "transducer_lag", "pressures_late"),
+                    "transducer_lag", "pressures_late", "transducer_gain"),
              faint=("stribeck_friction", "end_cushion", "external_leakage")),
 )  # fmt: skip
 

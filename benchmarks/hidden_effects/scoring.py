@@ -41,6 +41,11 @@ def _said(result: dict[str, Any]) -> list[str]:
     return [d["key"] for d in result.get("data_sheet", ())] + faults + ["spikes"] * bool(recording.get("spikes"))
 
 
+def _tied(result: dict[str, Any]) -> list[str]:
+    """Faults of the recording that are named as what may be in an effect's place."""
+    return [f["name"] for f in result.get("recording", {}).get("instead", ())]
+
+
 def accepted(answer: dict[str, Any]) -> tuple[str, ...]:
     """Verdicts that are right where nothing is hidden: a sheet may be found off, and spikes are a fault."""
     if not answer["setting"]["sized"]:
@@ -68,8 +73,8 @@ def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
         marks["silent"] = kind in accepted(answer)
         marks["named_none"] = kind in (MISSING, TIE)
     elif answer["kind"] in (DATUM, RECORDING):
-        silent = kind in (COMPLETE, DATA_SHEET, RECORDING)
-        marks["fault_named"] = silent and any(name in marks["said"] for name in answer["said"][0])
+        said = marks["said"] if kind in (COMPLETE, DATA_SHEET, RECORDING) else _tied(result) if kind == TIE else []
+        marks["fault_named"] = any(name in said for name in answer["said"][0])
     elif answer["kind"] == "single":
         tied = kind == TIE and blind and true[0] in result["verdict"].get("effects", ())  # these channels hold no more
         marks["right_first"] = (kind == MISSING and names[:1] == true) or tied

@@ -35,7 +35,7 @@ _ROUNDED = 6  # the same where what is measured is rounded, and the sensitivitie
 class Refit:
     """A model refitted: ``costs[i]`` (S_i,) sums of squares of every segment.
 
-    Of `as_it_is` also ``residual[i]`` (S_i, m): what is left.
+    Of `rounded` also ``residual[i]`` (S_i, m): what is left.
     """
 
     model: Model
@@ -54,14 +54,16 @@ def refit(at: Linearisation, model: Model, start: Mapping[str, float]) -> Refit:
     return Refit(model.with_values(values, source="fitted"), point.at_rest(_ROUNDS).costs)
 
 
-def as_it_is(at: Linearisation, model: Model) -> Refit:
-    """``model``, which has the linearisation's effects and more, with the values it has."""
-    none = Parameters.of(model, ())
-    point = FrozenPoint.at(at, Plant.for_fits(model), none, at.point.initial_states)
-    if point is None:
+def rounded(at: Linearisation, model: Model) -> Refit:
+    """Fit ``model``, which has effects without a derivative beyond those of the linearisation, from its values.
+
+    They only move the residuals: the sensitivities are those of the linearisation.
+    """
+    begin = FrozenPoint.at(at, Plant.for_fits(model), at.parameters, at.point.initial_states)
+    if begin is None:
         return Refit(model, at.costs, at.residual)
-    rested = point.at_rest(_ROUNDED)
-    return Refit(model, rested.costs, rested.raw)
+    point = minimise(begin.at_rest(_ROUNDED), _MOST_STEPS, _FLAT).point.at_rest(_ROUNDED)
+    return Refit(model.with_values(point.parameters.by_key, source="fitted"), point.costs, point.raw)
 
 
 def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Sequence[str]) -> FrozenPoint | None:

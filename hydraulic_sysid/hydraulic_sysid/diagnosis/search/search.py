@@ -28,7 +28,7 @@ from .candidates import candidates, delays, observed, subsystem
 from .data_sheet import Deviation, HeldNumbers, least, priors, relaxed, restored, significant, stretched, with_error
 from .drive_faults import costs_with
 from .errors import DiagnosisError
-from .frozen_jacobian import as_it_is, refit
+from .frozen_jacobian import refit, rounded
 from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import Misfit, explained, material, misfit
@@ -48,6 +48,7 @@ from .worth import (
     anything,
     decisive,
     enough_at_first,
+    leaves_most,
     near_competitors,
     superfluous,
     without_competitor,
@@ -219,6 +220,8 @@ class Search:
             found = min((self.with_fault(base, f) for f in near), key=lambda f: f.misfit.total)
             if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
+            if leaves_most(base.misfit, found.misfit):
+                break
             self.as_recorded = self.as_recorded or base.misfit
             self.faults = together(self.faults, found.fault)
             self.split, self.path = found.split, [found.state]
@@ -366,17 +369,17 @@ class Search:
 
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
-        smooth, seen = self._smooth(model), _observed(model)
+        smooth = self._smooth(model)
         segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
         done = fit_segments(
             Plant.for_fits(smooth), segments, smooth.movable_keys(), settings or self.settings,
             progress=lambda *_: self.say.left(), priors=self.priors,
         )  # fmt: skip
         at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors)
-        if not seen:
+        if smooth is model:
             return SearchState(at.model, at, misfit(self.split, at.costs), at.residual)
-        rounded = as_it_is(at, _with_values(model, at.model))
-        return SearchState(rounded.model, at, misfit(self.split, rounded.costs), rounded.residual)
+        seen = rounded(at, _with_values(model, at.model))
+        return SearchState(seen.model, at, misfit(self.split, seen.costs), seen.residual)
 
     def _strict(self, base: SearchState) -> bool:
         """Whether the data sheet is as it was given."""
@@ -419,7 +422,7 @@ class Search:
         self.say(f"refitting with {name}")
         done = refit(at, at.model.with_effect(name), candidate.start)
         if _observed(base.model):
-            done = as_it_is(at, _with_values(base.model.with_effect(name), done.model))
+            done = rounded(at, _with_values(base.model.with_effect(name), done.model))
         return CandidateRefit(name, done, misfit(self.split, done.costs))
 
     def finish(self, base: SearchState, enough: Enough) -> SearchState | None:

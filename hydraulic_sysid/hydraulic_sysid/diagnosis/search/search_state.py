@@ -35,8 +35,7 @@ class SearchState:
     """A model with some effects, fitted, and the candidates refitted on top of it, best first.
 
     ``linearisation`` has no effects that records show by themselves: such as rounding have no derivative, and ``model``
-    and ``misfit`` are with them, the parameters as they are without; ``residual`` (S, m) per record is what ``model``
-    leaves.
+    and ``misfit`` are with them, fitted with its sensitivities; ``residual`` (S, m) per record: what ``model`` leaves.
     """
 
     model: Model

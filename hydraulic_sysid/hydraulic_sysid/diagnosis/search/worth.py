@@ -98,6 +98,11 @@ def anything(name: str, after: Misfit, part: float) -> bool:
     return True
 
 
+def leaves_most(before: Misfit, after: Misfit) -> bool:
+    """Whether so little was left before that nothing need be missing, and much of that still is."""
+    return before.little and after.variance - 1.0 > SMALL_UNEXPLAINED * (before.variance - 1.0)
+
+
 def decisive(found: SearchResult) -> SearchResult:
     """A search without the effects that its data do not name.
 
@@ -106,7 +111,7 @@ def decisive(found: SearchResult) -> SearchResult:
     is how far laws are off those of the bench.
     """
     base, final = found.base.misfit, found.final.misfit
-    if found.added and base.little and final.variance - 1.0 > SMALL_UNEXPLAINED * (base.variance - 1.0):
+    if found.added and leaves_most(base, final):
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
         if needless(found, name) or vague(found, name):
