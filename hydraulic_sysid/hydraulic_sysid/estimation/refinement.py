@@ -25,7 +25,6 @@ LAW = 0.03  # share of itself by which every law may be off in a segment: no law
 TIMING = 0.3  # sampling intervals by which a channel may be late without further reason (order of conversion, filters)
 NEAR = 2.0  # residual over noise up to which a model says what delays there are
 HUM = 10.0  # standard deviations of the noise that a mains line may have in a segment
-ACCIDENTS = 0.02  # of all segments, at least one: no more are left out since they are far off
 SET_ASIDE = 10.0  # a segment whose cost is so many times that of nine in ten is left out
 
 
@@ -83,14 +82,8 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
 
 
 def usable(costs: Sequence[Array]) -> list[Mask]:
-    """Which segments are not far off all others: (S,) per record, from the costs (S,) of a fit.
-
-    All, where so many are that it is no accident: something acts there that the model does not have.
-    """
-    every = np.concatenate(costs)
-    most = SET_ASIDE * float(np.quantile(every, 0.9))
-    if np.count_nonzero(every > most) > max(1.0, ACCIDENTS * every.size):
-        most = np.inf
+    """Which segments are not far off all others: (S,) per record, from the costs (S,) of a fit."""
+    most = SET_ASIDE * float(np.quantile(np.concatenate(costs), 0.9))
     return [c <= most for c in costs]
 
 
