@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,11 @@ NODES = {
     ("recorder", "/right"),
     ("excitation", "/right"),
 }
+
+
+def at_rest(states: Sequence[Any]) -> bool:
+    """A drive of 0 V, and the piston where it is to a micrometre."""
+    return {s.effort[1] for s in states} == {0.0} and float(np.ptp([s.position[0] for s in states])) < 1e-6
 
 
 def short_plan(file: Path) -> Path:
@@ -66,8 +72,7 @@ def test_one_stands_stopped_beside_one_that_moves(
     wait_until(lambda: set(client.node.get_node_names_and_namespaces()) >= NODES, "all nodes")
     wait_until(lambda: {"/left/clock", "/right/clock", "/right/recorder/status"} <= names(client.node), "their topics")
     assert {name for name in names(client.node) if name.split("/")[1] not in ("left", "right", "test")} == set()
-    at_rest = [0.0] * round(RATE)
-    wait_until(lambda: [s.effort[1] for s in states["left"][-len(at_rest) :]] == at_rest, "a second at 0 V on the left")
+    wait_until(lambda: at_rest(states["left"][-round(RATE) :]), "a second at rest on the left")
     stopped = len(states["left"])
     begin = partial(client.call, "std_srvs/srv/Trigger", "/right/excitation/start")
     wait_until(lambda: (said := begin().message).startswith("starting") or "a run is on" in said, "a run on the right")
@@ -78,8 +83,7 @@ def test_one_stands_stopped_beside_one_that_moves(
     assert {"/diagnostics"} == {name for name in recorded(tmp_path / "bag") if not name.startswith("/right/")}
     assert recorded(tmp_path / "bag")["/right/predicted_state"] > len(record)
     still = states["left"][stopped:]
-    assert len(still) > 0.5 * len(record) and {state.effort[1] for state in still} == {0.0}
-    assert np.ptp([state.position[0] for state in still]) < 1e-6
+    assert len(still) > 0.5 * len(record) and at_rest(still)
 
 
 def names(node: Any) -> set[str]:
