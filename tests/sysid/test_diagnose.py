@@ -298,6 +298,12 @@ def test_no_more_numbers_move_than_have_to() -> None:
     assert list(held_numbers([1.0, 1.0]).fewest(100.0))[0] == ()
 
 
+def test_a_number_at_its_bound_has_the_error_that_it_has_beside_the_others() -> None:
+    found = held_numbers([30.0, 1.0]).deviation("a", ["a"], 30.0)
+    assert (found.key, found.nominal, found.value, found.standard_error) == ("a", 0.0, 30.0, 1.0)
+    assert found.cost == pytest.approx(900.0) and found.sure
+
+
 def test_of_numbers_that_say_the_same_either_may_move() -> None:
     """Only their difference is known well, as of two areas with the valve's flow free."""
     held = held_numbers([3.0, -3.0], correlation=0.999)

@@ -130,7 +130,7 @@ def as_filed(model: Model, filed: Model) -> Model:
 class HeldNumbers:
     """What it costs to hold numbers at what the model file says, by the quadratic around a fit of a `relaxed` model.
 
-    ``values`` (n,) of ``keys`` where they are best, as far as they are ``nominal`` (n,) nowhere else; ``cover`` (n, n).
+    ``values`` (n,) of ``keys`` as fitted, with their covariance ``cover`` (n, n), and the ``nominal`` ones (n,) [SI].
     """
 
     keys: tuple[str, ...]
@@ -168,6 +168,12 @@ class HeldNumbers:
             if found:
                 yield best
 
+    def deviation(self, key: str, moved: Collection[str], value: float) -> Deviation:
+        """One of the numbers ``moved`` [SI], with the error that it has where all of them are free."""
+        i, others = self.keys.index(key), [k for k in moved if k != key]
+        error = math.sqrt(max(float(self.cover[i, i]), 0.0))
+        return Deviation(key, float(self.nominal[i]), value, error, self.cost(others) - self.cost(moved))
+
     def instead(self, key: str, moved: Sequence[str], enough: float) -> list[tuple[str, ...]]:
         """Sets with another number in the place of ``key``, of those ``moved``, that cost ``enough`` more at most."""
         others = [k for k in moved if k != key]
@@ -178,10 +184,10 @@ class HeldNumbers:
 
 def significant(cost: float, count: int, variance: float) -> bool:
     """Whether a reduction of the sum of squares of ``count`` values is enough for a number to be named."""
-    return cost > least(count, variance)
+    return cost > least_cost(count, variance)
 
 
-def least(count: int, variance: float) -> float:
+def least_cost(count: int, variance: float) -> float:
     """The smallest reduction of the sum of squares of ``count`` values for which a number is named."""
     return max(SIGNIFICANT, VISIBLE * count) * variance
 

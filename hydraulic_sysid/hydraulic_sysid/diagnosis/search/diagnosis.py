@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
@@ -17,7 +17,7 @@ from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locat
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
-from .data_sheet import as_filed, with_error
+from .data_sheet import as_filed
 from .document import document, with_balances
 from .linearisation import Linearisation
 from .misfit import explained
@@ -103,7 +103,6 @@ def diagnose(
     beside = () if suspect is found.base else tuple(found.added)
     remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
     known = parameter_errors(found.final.linearisation)
-    found = replace(found, moved=[with_error(d, known) for d in found.moved])
     whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
     done = as_filed(finished(found, known), model)
     competing = {name: as_filed(other, model) for name, other in verdicts.alternatives(found, verdict).items()}

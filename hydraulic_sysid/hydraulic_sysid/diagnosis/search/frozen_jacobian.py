@@ -35,7 +35,7 @@ _ROUNDED = 6  # the same where what is measured is rounded, and the sensitivitie
 class Refit:
     """A model refitted: ``costs[i]`` (S_i,) sums of squares of every segment.
 
-    Of `rounded` also ``residual[i]`` (S_i, m): what is left.
+    Of `refit_rounded` also ``residual[i]`` (S_i, m): what is left.
     """
 
     model: Model
@@ -54,7 +54,7 @@ def refit(at: Linearisation, model: Model, start: Mapping[str, float]) -> Refit:
     return Refit(model.with_values(values, source="fitted"), point.at_rest(_ROUNDS).costs)
 
 
-def rounded(at: Linearisation, model: Model) -> Refit:
+def refit_rounded(at: Linearisation, model: Model) -> Refit:
     """Fit ``model``, which has effects without a derivative beyond those of the linearisation, from its values.
 
     They only move the residuals: the sensitivities are those of the linearisation.

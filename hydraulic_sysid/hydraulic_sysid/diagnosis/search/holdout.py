@@ -59,6 +59,11 @@ class Split:
         return replace(self, segments=kept, fit=[f[u] for f, u in zip(self.fit, usable, strict=True)])
 
     @property
+    def interval(self) -> float:
+        """The shortest sampling interval of the records [s]."""
+        return min(s.record.dt for s in self.segments)
+
+    @property
     def channels(self) -> list[str]:
         """All that are fitted in any record."""
         return list(dict.fromkeys(c for s in self.segments for c in s.channels))

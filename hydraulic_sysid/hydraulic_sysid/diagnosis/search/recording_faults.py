@@ -118,7 +118,7 @@ class RecordingFault:
         """Whether it is a disturbance of the drive rather than another reading of a channel."""
         return isinstance(self.hypothesis, DriveHypothesis)
 
-    def plain(self, dt: float) -> bool:
+    def unusual(self, dt: float) -> bool:
         """Whether it is larger than what sound transducers and loggers with this sampling interval [s] do, too."""
         return isinstance(self.hypothesis, DriveHypothesis) or abs(self.size) >= self.hypothesis.step(dt)
 
@@ -196,7 +196,7 @@ def _best(
     share: float,
     begin: float | None = None,
 ) -> RecordingFault | None:
-    unit = hypothesis.step(min(s.record.dt for s in part.split.segments))
+    unit = hypothesis.step(part.split.interval)
 
     def cost(size: float) -> float:
         changed = [hypothesis.applied(s, size * unit) for s in part.point.shooting.segments]

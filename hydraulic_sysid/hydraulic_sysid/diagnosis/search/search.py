@@ -25,10 +25,20 @@ from hydraulic_sysid.estimation.refinement import refined, usable
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
 from .candidates import candidates, delays, observed, subsystem
-from .data_sheet import Deviation, HeldNumbers, least, priors, relaxed, restored, significant, stretched, with_error
+from .data_sheet import (
+    Deviation,
+    HeldNumbers,
+    least_cost,
+    priors,
+    relaxed,
+    restored,
+    significant,
+    stretched,
+    with_error,
+)
 from .drive_faults import costs_with
 from .errors import DiagnosisError
-from .frozen_jacobian import refit, rounded
+from .frozen_jacobian import refit, refit_rounded
 from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import Misfit, explained, material, misfit
@@ -60,7 +70,7 @@ MOST_REFITS = 8
 LATER_REFITS = 4  # once something was added, …
 ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
 FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
-NEAR = 0.93  # of the best reduction, from which a refit is finished, …
+NEAR = 0.93  # of the best reduction, from which a refit is finished
 MOST_EFFECTS = 3
 LOOSE = 1.03  # mean square over noise from which numbers of the data sheet are tried at all
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
@@ -145,10 +155,10 @@ class Search:
         if strict.misfit.variance < LOOSE or not self._strict(strict):
             return strict
         self.say("fitting the model within the tolerances of its data sheet")
+        at_bound = strict.linearisation.parameters.at_bound
+        # What lies at its bound may be far beyond it.
+        far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
         try:
-            at_bound = strict.linearisation.parameters.at_bound
-            # What lies at its bound may be far beyond it.
-            far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
             loose = self.nearer(relaxed(strict.model), far)
         except SimulationError:  # it went where the plant does not run
             return strict
@@ -204,11 +214,10 @@ class Search:
                 break
             self.say("faults of the recording")
             # A disturbance is free enough to take up what laws leave, the reading of a channel is not.
-            plain = not negligible(left, UNNOTICED) and not immaterial(base.misfit, left)
-            faults = recording_faults(base.linearisation, disturbances=plain)
+            disturbances = not negligible(left, UNNOTICED) and not immaterial(base.misfit, left)
+            faults = recording_faults(base.linearisation, disturbances)
             if base.misfit.little:  # filters of sound transducers delay by a part of a sampling interval, too
-                shortest = min(s.record.dt for s in self.split.segments)
-                faults = [f for f in faults if f.plain(shortest)]
+                faults = [f for f in faults if f.unusual(self.split.interval)]
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             enough = RIVAL * (base.misfit.fit - best)
             self.rivals = [f for f in faults if not f.linear and f.reduction >= enough][:FULL]
@@ -230,10 +239,9 @@ class Search:
 
     def within_a_sample(self, tried: CandidateRefit) -> bool:
         """Whether an effect only delays, by less than a sampling interval: sound sensors and loggers do so, too."""
-        effect = self.given.library[tried.name]
-        shortest = min(s.record.dt for s in self.split.segments)
-        sizes = [tried.refit.model.value(f"{effect.name}.{p.name}") for p in effect.parameters]
-        return delays(effect) and all(size < shortest for size in sizes)
+        effect, model = self.given.library[tried.name], tried.refit.model
+        sizes = (model.value(f"{effect.name}.{p.name}") for p in effect.parameters)
+        return delays(effect) and all(size < self.split.interval for size in sizes)
 
     def rounded(self, base: SearchState) -> SearchState:
         """A state with refits of the effects whose size records show by themselves.
@@ -248,18 +256,20 @@ class Search:
         """A state fitted to records that are taken to have a fault, again while the fault's best size changes."""
         self.say(f"fitting with: {fault.text}")
         before = self.split
-        self.split = replace(before, segments=fault.applied(base.linearisation))
-        state = self.state(base.model, self._last)
-        for _ in range(MOST_SIZES):
-            new = resized(state.linearisation, fault)
-            if new is fault or abs(new.size - fault.size) < max(SAME_SIZE * abs(fault.size), 2.0 * new.standard_error):
-                break
-            fault = replace(new, reduction=fault.reduction)
-            self.split = replace(before, segments=fault.on(before.segments))
-            state = self.state(state.model, self._last)
-        worth = misfit(self.split, costs_with(state.linearisation, base.linearisation))
-        found, self.split = FaultFit(fault, state, self.split, worth), before
-        return found
+        try:
+            self.split = replace(before, segments=fault.applied(base.linearisation))
+            state = self.state(base.model, self._last)
+            for _ in range(MOST_SIZES):
+                new, error = resized(state.linearisation, fault), SAME_SIZE * abs(fault.size)
+                if new is fault or abs(new.size - fault.size) < max(error, 2.0 * new.standard_error):
+                    break
+                fault = replace(new, reduction=fault.reduction)
+                self.split = replace(before, segments=fault.on(before.segments))
+                state = self.state(state.model, self._last)
+            worth = misfit(self.split, costs_with(state.linearisation, base.linearisation))
+            return FaultFit(fault, state, self.split, worth)
+        finally:
+            self.split = before
 
     def _laws(self, model: Model) -> list[str]:
         """Parameters that stand for a law: the free ones, not the numbers that a data sheet states."""
@@ -270,9 +280,7 @@ class Search:
         base, final = found.base, found.final
         if self._strict(base):
             return found
-        self.say("fitting with the data sheet as it is")
-        strict = self.state(restored(base.model, self.given, []), self._last)
-        strict = replace(strict, refits=base.refits, scores=base.scores)
+        strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
         done, moved = self.fewest_moved(final, strict if final is base else None)
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
             moved = [replace(d, instead=self.instead(strict, done, d, moved)) for d in moved]
@@ -287,12 +295,10 @@ class Search:
         ``final``: all are free; ``strict``: none is, where that is known.
         """
         held = HeldNumbers.of(final.linearisation, self.given)
-        count, variance = final.misfit.count, final.misfit.variance
-        enough = least(count, variance)
-        moved, done = held.keys, final
+        enough = least_cost(final.misfit.count, final.misfit.variance)
         for moved in held.fewest(enough):
             done = strict if strict is not None and not moved else self.with_moved(final, moved)
-            if not significant(done.misfit.total - final.misfit.total, count, variance):
+            if done.misfit.total - final.misfit.total <= enough:
                 break
         for key in moved:
             # Another number may say the same, or what a fit gained came from the others, which had stopped short.
@@ -300,7 +306,7 @@ class Search:
             if not deviation.sure and deviation.cost < CLEAR * enough:
                 others = tuple(k for k in moved if k != key)
                 back = self.with_moved(done, others)
-                if not significant(back.misfit.total - done.misfit.total, count, variance):
+                if back.misfit.total - done.misfit.total <= enough:
                     moved, done = others, back
         found = []
         for key in moved:
@@ -314,15 +320,12 @@ class Search:
 
     def with_moved(self, state: SearchState, moved: Sequence[str]) -> SearchState:
         """A state with the data sheet as it was given but for the numbers ``moved``."""
-        self.say(f"fitting with {' and '.join(['the data sheet as it is', *(f'another {key}' for key in moved)])}")
+        self.say("fitting with the data sheet as it is" + (f", but for {' and '.join(moved)}" if moved else ""))
         return self.state(restored(state.model, self.given, moved), self._last)
 
     def deviation(self, held: HeldNumbers, key: str, moved: Sequence[str], state: SearchState) -> Deviation:
         """One of the numbers ``moved`` in a state."""
-        others = [k for k in moved if k != key]
-        nominal = float(held.nominal[held.keys.index(key)])
-        found = Deviation(key, nominal, state.model.value(key), np.inf, held.cost(others) - held.cost(moved))
-        return with_error(found, parameter_errors(state.linearisation))
+        return with_error(held.deviation(key, moved, state.model.value(key)), parameter_errors(state.linearisation))
 
     def set_against_faults(self, found: SearchResult) -> SearchResult:
         """With the faults of the recording that explain what the one effect added does.
@@ -331,20 +334,27 @@ class Search:
         """
         if len(found.added) != 1:
             return found
-        final, same = found.final, list[RecordingFault]()
-        model = final.model.without_effect(found.added[0])
-        plain = restored(model, self.given, [])
+        model = found.final.model.without_effect(found.added[0])
+        same = list[RecordingFault]()
         for fault in self.rivals:
-            tried = self.with_fault(replace(final, model=plain), fault)
-            if not _worse(tried.state.misfit, final.misfit) and found.moved:
-                faults, before = (*found.faults, tried.fault), found.as_recorded or found.base.misfit
-                found = replace(found, split=tried.split, final=tried.state, faults=faults, as_recorded=before)
-                return replace(found, base=tried.state, misfits={}, competing={}, moved=())
-            if found.moved:
-                tried = self.with_fault(replace(final, model=model), fault)
-            if not _worse(tried.state.misfit, final.misfit):
-                same.append(tried.fault)
+            alone = self.as_good(found, restored(model, self.given, []), fault)
+            if alone is not None and found.moved:
+                return replace(
+                    found, split=alone.split, base=alone.state, final=alone.state, misfits={}, competing={}, moved=(),
+                    faults=tuple(together(found.faults, alone.fault)),
+                    as_recorded=found.as_recorded or found.base.misfit,
+                )  # fmt: skip
+            tied = self.as_good(found, model, fault) if found.moved else alone
+            same += [tied.fault] if tied is not None else []
         return replace(found, faults_instead=tuple(same))
+
+    def as_good(self, found: SearchResult, model: Model, fault: RecordingFault) -> FaultFit | None:
+        """A model with a fault of the recording, if together they explain what was found."""
+        try:
+            tried = self.with_fault(replace(found.final, model=model), fault)
+        except SimulationError:  # with the values that it has beside the effect
+            return None
+        return None if _worse(tried.state.misfit, found.final.misfit) else tried
 
     def instead(
         self, strict: SearchState, done: SearchState, deviation: Deviation, moved: Sequence[Deviation]
@@ -353,9 +363,8 @@ class Search:
 
         ``strict``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
         """
-        self.say(f"fitting without another {deviation.key}")
         others = [d.key for d in moved if d.key != deviation.key]
-        without = self.state(restored(done.model, self.given, others), self._last) if others else strict
+        without = self.with_moved(done, others) if others else strict
         promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
         found = []
         for r in [r for r in self.explore(without, LATER_REFITS).refits if r.misfit.total < promising][:FULL]:
@@ -378,7 +387,7 @@ class Search:
         at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors)
         if smooth is model:
             return SearchState(at.model, at, misfit(self.split, at.costs), at.residual)
-        seen = rounded(at, _with_values(model, at.model))
+        seen = refit_rounded(at, _with_values(model, at.model))
         return SearchState(seen.model, at, misfit(self.split, seen.costs), seen.residual)
 
     def _strict(self, base: SearchState) -> bool:
@@ -422,7 +431,7 @@ class Search:
         self.say(f"refitting with {name}")
         done = refit(at, at.model.with_effect(name), candidate.start)
         if _observed(base.model):
-            done = rounded(at, _with_values(base.model.with_effect(name), done.model))
+            done = refit_rounded(at, _with_values(base.model.with_effect(name), done.model))
         return CandidateRefit(name, done, misfit(self.split, done.costs))
 
     def finish(self, base: SearchState, enough: Enough) -> SearchState | None:

@@ -84,8 +84,8 @@ def judge(result: SearchResult) -> Verdict:
     final = result.final.misfit
     competing = {name: competing_models(name, state, final) for name, state in result.competing.items()}
     family = families(result.model, result.added, result.split.channels)
-    tied = bool(family) or any(not c.distinguishable for every in competing.values() for c in every)
-    tied = tied or bool(result.faults_instead)
+    rivals = any(not c.distinguishable for every in competing.values() for c in every)
+    tied = rivals or bool(family) or bool(result.faults_instead)
     return Verdict(kind_of(result, tied), result.added, competing, family)
 
 

@@ -10,7 +10,7 @@ from .competing_models import competing_models
 from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material
 from .search_state import SearchResult, SearchState
 
-FAR = 5.0  # … if it leaves no more than so many times what the best leaves
+FAR = 5.0  # times what the best leaves: what leaves more comes not near it
 FURTHER = 0.25  # of what is left, which a further effect must explain, unless it explains a good part of all
 NEEDED = 0.02  # of all that was explained, which an effect must explain beside the others to stay
 SUBORDINATE = 0.1  # of all that was explained, below which a further effect must be told apart to be named
