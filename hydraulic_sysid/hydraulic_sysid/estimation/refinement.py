@@ -25,7 +25,8 @@ LAW = 0.03  # share of itself by which every law may be off in a segment: no law
 TIMING = 0.3  # sampling intervals by which a channel may be late without further reason (order of conversion, filters)
 NEAR = 2.0  # residual over noise up to which a model says what delays there are
 HUM = 10.0  # standard deviations of the noise that a mains line may have in a segment
-SET_ASIDE = 10.0  # a segment whose cost is so many times that of nine in ten is left out
+FAR_OFF = 10.0  # times the cost of nine in ten segments: a segment that says nothing of the noise, …
+ACCIDENTS = 0.02  # … and is left out, if no more are than this share of all, or one
 
 
 def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) -> list[Segments]:
@@ -38,32 +39,27 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
     segments, projections = point.shooting.segments, point.projections
     channels = list(dict.fromkeys(c for s in segments for c in s.channels))
     left = [s.in_units(p.residual) for s, p in zip(segments, projections, strict=True)]
-    near = point.cost < NEAR**2 * sum(int(s.counted.sum()) for s in segments)
-    late = _delays(point, columns, channels) if near else {}
+    told = point.cost < NEAR**2 * sum(int(s.counted.sum()) for s in segments)
+    late = _delays(point, columns, channels) if told else {}
     noise: dict[str, ChannelNoise] = {}
-    loud = [s.loudness.copy() for s in segments]
-    runs = point.shooting.simulated(point.plant, point.initial_states)
-    deviations = [np.abs(s.measured - s.recorded(run)) for s, run in zip(segments, runs, strict=True)]
-    spikes = [s.outliers.copy() for s in segments]
+    loud = [np.ones_like(s.loudness) for s in segments]
+    spikes = _spikes(point, left, channels)
+    near = _near(point, spikes)
     lines: dict[str, tuple[float, ...]] = {}
     for channel in channels:
         where = [(i, s.channels.index(channel)) for i, s in enumerate(segments) if channel in s.channels]
         dt = segments[where[0][0]].record.dt
-        first = noise_model.estimate([left[i][:, :, c] for i, c in where], dt)
-        for i, c in where:
-            spikes[i][:, :, c] &= deviations[i][:, :, c] > noise_model.OUTLIER * first.std
-            spikes[i][:, :, c] |= noise_model.outliers(left[i][:, :, c], first)
-        cleaned = [np.where(spikes[i][:, :, c], 0.0, left[i][:, :, c]) for i, c in where]
+        cleaned = [np.where(spikes[i][:, :, c], 0.0, left[i][:, :, c])[near[i]] for i, c in where]
         known = {f for i, c in where for f in segments[i].hum[c]}
-        lines[channel] = tuple(known) or _lines([r[:, :-1].ravel() for r in cleaned], dt)
-        quiet = [_without(r, lines[channel], segments[i]) for r, (i, _) in zip(cleaned, where, strict=True)]
+        lines[channel] = tuple(known) or _lines([r[:, :-1].ravel() for r in cleaned if len(r)], dt)
+        parts = [segments[i].subset(near[i]) for i, _ in where]
+        quiet = [_without(r, lines[channel], part) for r, part in zip(cleaned, parts, strict=True)]
         # Its colour is that of all, each segment brought to the same strength.
         even = noise_model.estimate(quiet, dt)
-        for (i, c), own in zip(where, noise_model.loudness(quiet, even), strict=True):
-            loud[i][:, c] = own
-        noise[channel] = noise_model.estimate(
-            [q / loud[i][:, c, None] for q, (i, c) in zip(quiet, where, strict=True)], dt
-        )
+        strength = noise_model.loudness(quiet, even)
+        for (i, c), own in zip(where, strength, strict=True):
+            loud[i][near[i], c] = own
+        noise[channel] = noise_model.estimate([q / own[:, None] for q, own in zip(quiet, strength, strict=True)], dt)
     parameters = point.parameters
     own = np.array([k in laws for k in parameters.keys], dtype=bool)
     shares = np.where(own, parameters.values / parameters.scales * LAW, 0.0)
@@ -81,10 +77,44 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
     return found
 
 
-def usable(costs: Sequence[Array]) -> list[Mask]:
-    """Which segments are not far off all others: (S,) per record, from the costs (S,) of a fit."""
-    most = SET_ASIDE * float(np.quantile(np.concatenate(costs), 0.9))
+def usable(point: FitPoint, found: Sequence[Segments]) -> list[Mask]:
+    """Which segments are to be judged: (S,) per record; ``found`` are the point's with their outliers.
+
+    Not the few that are far off all others, as after a knock on the bench. Where many are, something acts there that
+    the model does not have.
+    """
+    near = _near(point, [s.outliers for s in found])
+    every = np.concatenate(near)
+    if np.count_nonzero(~every) <= max(1.0, ACCIDENTS * every.size):
+        return near
+    return [np.ones_like(n) for n in near]
+
+
+def _near(point: FitPoint, spikes: Sequence[Mask]) -> list[Mask]:
+    """Which segments (S,) are not far off all others, whatever the samples that are spikes (S, samples, C) say."""
+    segments = point.shooting.segments
+    costs = [
+        np.sum(np.where(own, 0.0, s.by_channel(p.residual)) ** 2, axis=(1, 2))
+        / np.maximum(np.sum(~own, axis=(1, 2)), 1)
+        for s, p, own in zip(segments, point.projections, spikes, strict=True)
+    ]
+    most = FAR_OFF * float(np.quantile(np.concatenate(costs), 0.9))
     return [c <= most for c in costs]
+
+
+def _spikes(point: FitPoint, left: Sequence[Array], channels: Sequence[str]) -> list[Mask]:
+    """Samples (S, samples, C) that are outliers of what a point has ``left`` (S, samples, C) [SI]."""
+    segments = point.shooting.segments
+    runs = point.shooting.simulated(point.plant, point.initial_states)
+    deviations = [np.abs(s.measured - s.recorded(run)) for s, run in zip(segments, runs, strict=True)]
+    found = [s.outliers.copy() for s in segments]
+    for channel in channels:
+        where = [(i, s.channels.index(channel)) for i, s in enumerate(segments) if channel in s.channels]
+        first = noise_model.estimate([left[i][:, :, c] for i, c in where], segments[where[0][0]].record.dt)
+        for i, c in where:
+            found[i][:, :, c] &= deviations[i][:, :, c] > noise_model.OUTLIER * first.std
+            found[i][:, :, c] |= noise_model.outliers(left[i][:, :, c], first)
+    return found
 
 
 def _raw_columns(segments: Segments, columns: Array, shares: Array) -> Array:

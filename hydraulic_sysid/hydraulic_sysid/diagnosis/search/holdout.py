@@ -22,7 +22,7 @@ from hydraulic_sysid.diagnosis.check import resonance
 from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.segments import MEASURED, Segments, cut, spread
 
-from .set_aside import SetAside, set_aside
+from .set_aside import SetAside, far_off, set_aside
 
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
@@ -56,7 +56,9 @@ class Split:
     def judged(self, segments: Sequence[Segments], usable: Sequence[Mask]) -> Split:
         """The same roles for segments of which more is known, without those that are not ``usable[i]`` (S_i,)."""
         kept = [s.subset(u) for s, u in zip(segments, usable, strict=True)]
-        return replace(self, segments=kept, fit=[f[u] for f, u in zip(self.fit, usable, strict=True)])
+        aside = [a for s, u in zip(segments, usable, strict=True) for a in far_off(s, u)]
+        fit = [f[u] for f, u in zip(self.fit, usable, strict=True)]
+        return replace(self, segments=kept, fit=fit, set_aside=[*self.set_aside, *aside])
 
     @property
     def interval(self) -> float:

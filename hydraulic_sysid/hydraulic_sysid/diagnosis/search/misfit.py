@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -64,6 +64,11 @@ class Misfit:
     def variance(self) -> float:
         """Mean square over noise, at least 1."""
         return max(1.0, self.total / max(self.count, 1))
+
+    @property
+    def summed(self) -> Misfit:
+        """The sums alone, whatever single segments leave."""
+        return replace(self, by_segment=np.zeros(0))
 
     @property
     def excess(self) -> float:

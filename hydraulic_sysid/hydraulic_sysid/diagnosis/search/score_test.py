@@ -23,18 +23,21 @@ from .candidates import LARGE, SIZES, Probe, RecordFeatures, between, inverse, o
 from .linearisation import Linearisation
 
 ENOUGH = 50  # segments that do for a look, spread over all records
+AS_WELL = 0.5  # of the best prediction, from which that of another shape is a start as well
 
 
 @dataclass(frozen=True)
 class CandidateScore:
     """A candidate and the best its probes predict.
 
-    ``reduction`` of the sum of squares, and the values to ``start`` a refit from [SI, by key].
+    ``reduction`` of the sum of squares, and the values to ``start`` a refit from [SI, by key]; ``or_from``: the best of
+    another shape, where it promises nearly as much.
     """
 
     effect: Effect
     reduction: float
     start: dict[str, float]
+    or_from: dict[str, float] | None = None
 
 
 def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures) -> list[CandidateScore]:
@@ -51,8 +54,19 @@ def _score(at: Linearisation, effect: Effect, features: RecordFeatures) -> Candi
         found = [_predict(at, plant, effect, group) for group in probes(effect, features, sizes)]
         usable = [f for f in found if f is not None]
         if usable:
-            return max(usable, key=lambda f: f.reduction)
+            return _best(usable)
     return None
+
+
+def _best(found: Sequence[CandidateScore]) -> CandidateScore:
+    """The best of one effect's, and the start of the next of another shape: a prediction that far is rough."""
+    best = max(found, key=lambda f: f.reduction)
+    shape = [f"{best.effect.name}.{p.name}" for p in best.effect.parameters if p.null is None]
+    others = [f for f in found if any(f.start[key] != best.start[key] for key in shape)]
+    other = max(others, key=lambda f: f.reduction, default=None)
+    if other is None or other.reduction < AS_WELL * best.reduction:
+        return best
+    return replace(best, or_from=other.start)
 
 
 def _predict(at: Linearisation, plant: Plant, effect: Effect, group: list[Probe]) -> CandidateScore | None:

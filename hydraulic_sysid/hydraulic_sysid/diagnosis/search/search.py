@@ -69,7 +69,7 @@ PROMISING = 0.04  # of the best predicted reduction, from which a candidate is r
 MOST_REFITS = 8
 LATER_REFITS = 4  # once something was added, …
 ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
-FULL = 2  # candidates whose refit is finished with all sensitivities taken anew
+FULL = 2  # candidates that are refitted from more than one start, and with all sensitivities taken anew
 NEAR = 0.93  # of the best reduction, from which a refit is finished
 MOST_EFFECTS = 3
 LOOSE = 1.03  # mean square over noise from which numbers of the data sheet are tried at all
@@ -197,7 +197,7 @@ class Search:
             self.say("noise of the records")
             at, before = state.linearisation, self.split
             segments = refined(at.point, at.columns, self._laws(state.model))
-            after = before.judged(segments, usable(at.costs))
+            after = before.judged(segments, usable(at.point, segments))
             if number and not quieter(before, after) and not retimed(before, after):
                 break
             self.split = after
@@ -412,8 +412,10 @@ class Search:
         best = varied(worth, ALIKE if most < MOST_REFITS else most)[:most]
         every: list[CandidateRefit] = []
         self.tried = (base, every)
-        for s in best:
-            every.append(self.refit(base, s))
+        for number, s in enumerate(best):
+            starts = [s.start, s.or_from] if s.or_from is not None and number < FULL else [s.start]
+            tried = [self.refit(base, replace(s, start=start)) for start in starts]
+            every.append(min(tried, key=lambda r: r.misfit.total))
             self.say.reached(self._added(every[-1].refit.model), every[-1].misfit)
         pairs = zip(every, best, strict=True)
         refits = [r for r, s in pairs if not observed(s.effect) or base.misfit.total - r.misfit.total > least]
@@ -439,7 +441,9 @@ class Search:
 
         ``enough(name, misfit, part)``: whether an effect's misfit is a part of the way to being worth it.
         """
-        worth = [r for r in base.refits if material(base.misfit, r.misfit) and enough(r.name, r.misfit, PROMISED)]
+        # A quick refit keeps what the model was bent to where the effect acts: the sum alone is asked for.
+        least = base.misfit.total - base.misfit.least
+        worth = [r for r in base.refits if r.misfit.total < least and enough(r.name, r.misfit.summed, PROMISED)]
         if not worth:
             return None
         top = base.misfit.total - worth[0].misfit.total

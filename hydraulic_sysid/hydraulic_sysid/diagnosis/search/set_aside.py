@@ -1,4 +1,4 @@
-"""What of a record is not judged: converters at the end of their range, and rests against a stop the model lacks.
+"""What of a record is not judged: converters at their end, rests against a stop the model lacks, accidents.
 
 A channel at its end does not show what it measures. A piston that stands against a stop while the valve is open says
 where the stop is and nothing of the physics between the stops; where the model has its stop elsewhere (or position 0 is
@@ -17,9 +17,9 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.check import other_stops
 from hydraulic_sysid.estimation.saturation import at_end_of_range
-from hydraulic_sysid.estimation.segments import MEASURED
+from hydraulic_sysid.estimation.segments import MEASURED, Segments
 
-SATURATED, STOP = "saturated", "stop"
+SATURATED, STOP, FAR_OFF = "saturated", "stop", "far off"
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,14 @@ def set_aside(model: Model, records: Sequence[Record], length: float) -> tuple[l
             out |= stop.near[i]
         masks.append(out)
     return masks, found
+
+
+def far_off(segments: Segments, usable: Mask) -> list[SetAside]:
+    """The segments that are not ``usable`` (S,)."""
+    out: Mask = np.zeros(len(segments.record), dtype=bool)
+    for first in segments.first[~usable].tolist():
+        out[first : first + segments.samples] = True
+    return _noted(segments.record, "position", FAR_OFF, out)
 
 
 def _noted(record: Record, channel: str, reason: str, at: Mask) -> list[SetAside]:

@@ -20,7 +20,7 @@ from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
 from .remainder import Remainder, immaterial
 from .search_state import SearchResult
-from .set_aside import SATURATED, SetAside
+from .set_aside import FAR_OFF, SATURATED, SetAside
 from .whiteness import Whiteness
 
 MISSING = "missing"
@@ -273,7 +273,7 @@ def set_aside_sentences(found: Sequence[SetAside]) -> list[str]:
     """What of the records is not judged, why, and what to mend; one sentence per channel, reason and end."""
     groups: dict[tuple[str, str, bool], list[SetAside]] = {}
     for one in found:
-        groups.setdefault((one.channel, one.reason, one.reading > 0.0), []).append(one)
+        groups.setdefault((one.channel, one.reason, one.reason != FAR_OFF and one.reading > 0.0), []).append(one)
     said = []
     for (channel, reason, _), every in groups.items():
         at = quantity(float(np.median([a.reading for a in every])), UNITS[channel], 4)
@@ -282,6 +282,11 @@ def set_aside_sentences(found: Sequence[SetAside]) -> list[str]:
             said.append(
                 f"{_first_upper(TITLES[channel])} is clipped at {at}: its converter is at its end for {time} of "
                 f"{_count(every)}. These parts are set aside: enlarge the range."
+            )
+        elif reason == FAR_OFF:
+            said.append(
+                f"{time} of {_count(every)} are far off all else, from {every[0].time:.4g} s of {every[0].record} on, "
+                "and set aside: look at what happened there."
             )
         else:
             said.append(
