@@ -14,8 +14,7 @@ from .holdout import Split
 
 SIGNIFICANT = 25.0  # reduction of the sum of squares, of the present variance, on segments for fitting …
 CONFIRMED = 10.0  # … and on those for validation
-WORST = 0.05  # of all segments, at least one, that do not count for whether something is missing at all
-BEST = 0.02  # of all segments, at least one, without which a reduction must be one, too
+FEW = 0.02  # of all segments, at least one: so many do not turn a verdict, neither by what they leave nor by their gain
 UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
 LITTLE = 1.03  # residual over noise up to which nothing need be missing
 SMALL = 1.2  # mean square over noise that is not far off it
@@ -115,16 +114,17 @@ def misfit(split: Split, costs: Sequence[Array]) -> Misfit:
 def material(before: Misfit, after: Misfit) -> bool:
     """Whether a reduction is more than chance, more than fitting itself gives, and enough to be seen.
 
-    It must be so without the few segments that gain most, too; those that are worst in the end do not count.
+    It must be so without the few segments that gain most and those that lose most, too.
     """
     gain, fit, validation = before.total - after.total, before.fit - after.fit, before.validation - after.validation
     if gain <= 0.0:
         return False
     if _comparable(before, after):
+        gains = before.by_segment - after.by_segment
+        few = _few(gains)
+        gain = float(np.sort(gains)[few : gains.size - few].sum())
         kept = _but_the_worst(after.by_segment, after.counted)
-        gains, fitted = (before.by_segment - after.by_segment)[kept], after.fitted[kept]
-        fit, validation = float(gains[fitted].sum()), float(gains[~fitted].sum())
-        gain = float(np.sort(gains)[: gains.size - max(1, round(BEST * gains.size))].sum())
+        fit, validation = (float(gains[kept][part[kept]].sum()) for part in (after.fitted, ~after.fitted))
     held = not before.n_validation or validation > CONFIRMED * before.variance
     return gain >= before.least and held and fit > SIGNIFICANT * before.variance
 
@@ -150,4 +150,9 @@ def _comparable(before: Misfit, after: Misfit) -> bool:
 
 
 def _but_the_worst(cost: Array, count: Array) -> Index:
-    return np.argsort(cost / count)[: max(1, cost.size - max(1, round(WORST * cost.size)))]
+    return np.argsort(cost / count)[: cost.size - _few(cost)]
+
+
+def _few(segments: Array) -> int:
+    """How many of so many segments are no more than a few."""
+    return min(max(1, round(FEW * segments.size)), (segments.size - 1) // 2)
