@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -21,6 +21,9 @@ from .effect import arguments
 from .errors import SimulationError
 from .model import Model
 from .plant import Plant
+
+if TYPE_CHECKING:  # it takes a second to import, and only those who ask for its objects need it
+    import control
 
 _FRACTION = 1e-5  # difference step, of a state's scale
 
@@ -53,6 +56,8 @@ class ClosedForm:
 
     def transfer_function(self) -> control.TransferFunction:
         """Drive [V] to position [m]."""
+        import control
+
         w, z = self.natural_frequency, self.damping
         return control.TransferFunction([self.velocity_gain], [1.0 / w**2, 2.0 * z / w, 1.0, 0.0])
 
@@ -65,17 +70,12 @@ def linearise(model: Model, position: float = 0.0, drive: float = 0.0) -> contro
 
     :raises SimulationError: no steady motion exists at that drive.
     """
+    import control
+
     plant, active = _smooth_plant(model)
     point = operating_point(model, position, drive)
     names, places = list(active), list(active.values())
-    a = np.empty((len(names), len(names)))
-    for j, index in enumerate(places):
-        h = _FRACTION * list(plant.layout.state_records.values())[index].scale
-        up, down = point.state.copy(), point.state.copy()
-        up[index] += h
-        down[index] -= h
-        difference = plant.derivative(up, drive)[0] - plant.derivative(down, drive)[0]
-        a[:, j] = difference[places] / (2.0 * h)
+    a = _state_matrix(plant, places, point)
     h = 1e-4 * plant.value("drive_limit")
     difference = plant.derivative(point.state, drive + h)[0] - plant.derivative(point.state, drive - h)[0]
     b = difference[places] / (2.0 * h)
@@ -84,6 +84,28 @@ def linearise(model: Model, position: float = 0.0, drive: float = 0.0) -> contro
     return control.ss(
         a, b[:, None], c, np.zeros((len(outputs), 1)), states=names, inputs=["drive"], outputs=outputs, name=model.name
     )
+
+
+def poles(model: Model) -> Array:
+    """Poles (n,) [rad/s] of `linearise` at rest in mid stroke.
+
+    :raises SimulationError: no steady motion exists there.
+    """
+    plant, active = _smooth_plant(model)
+    return np.asarray(np.linalg.eigvals(_state_matrix(plant, list(active.values()), operating_point(model))))
+
+
+def _state_matrix(plant: Plant, places: list[int], point: OperatingPoint) -> Array:
+    """Derivatives (n, n) of the states' rates by the states at ``places``."""
+    a = np.empty((len(places), len(places)))
+    for j, index in enumerate(places):
+        h = _FRACTION * list(plant.layout.state_records.values())[index].scale
+        up, down = point.state.copy(), point.state.copy()
+        up[index] += h
+        down[index] -= h
+        difference = plant.derivative(up, point.drive)[0] - plant.derivative(down, point.drive)[0]
+        a[:, j] = difference[places] / (2.0 * h)
+    return a
 
 
 def operating_point(model: Model, position: float = 0.0, drive: float = 0.0) -> OperatingPoint:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydraulic_sim.errors import SimulationError
-from hydraulic_sim.linear import linearise
+from hydraulic_sim.linear import poles
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import percent, quantity
 
@@ -78,10 +78,10 @@ def _slow(seen: Observed, frequency: float) -> Finding:
 def resonance(model: Model) -> float | None:
     """Frequency [Hz] of the slowest oscillating mode of the model at rest in mid stroke; None where none oscillates."""
     try:
-        poles = np.linalg.eigvals(linearise(model).A)
+        found = poles(model)
     except SimulationError:
         return None
-    swinging = np.abs(poles[poles.imag > 1e-6 * np.abs(poles)])
+    swinging = np.abs(found[found.imag > 1e-6 * np.abs(found)])
     return float(swinging.min() / (2.0 * np.pi)) if swinging.size else None
 
 
