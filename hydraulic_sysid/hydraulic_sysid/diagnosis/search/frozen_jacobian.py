@@ -26,7 +26,7 @@ from .linearisation import Linearisation
 _ENDLESS = 1e100  # residual over noise of a run that has left all bounds
 _FLAT = 2e-4  # relative gain of a step that ends the refit
 _MOST_STEPS = 10
-_SHARES = (1.0, 0.5, 0.2, 0.05)  # of the predicted size, to start from
+_SHARES = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.05)  # of the predicted size, to start from
 _ROUNDS = 2  # times that initial states are moved at the end
 _ROUNDED = 6  # the same where what is measured is rounded, and the sensitivities only point the way
 

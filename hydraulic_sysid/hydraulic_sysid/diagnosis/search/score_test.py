@@ -30,14 +30,14 @@ AS_WELL = 0.5  # of the best prediction, from which that of another shape is a s
 class CandidateScore:
     """A candidate and the best its probes predict.
 
-    ``reduction`` of the sum of squares, and the values to ``start`` a refit from [SI, by key]; ``or_from``: the best of
-    another shape, where it promises nearly as much.
+    ``reduction`` of the sum of squares, and the values to ``start`` a refit from [SI, by key]; ``others``: where it may
+    begin if that leads nowhere, as a prediction that far is rough.
     """
 
     effect: Effect
     reduction: float
     start: dict[str, float]
-    or_from: dict[str, float] | None = None
+    others: tuple[dict[str, float], ...] = ()
 
 
 def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures) -> list[CandidateScore]:
@@ -59,14 +59,16 @@ def _score(at: Linearisation, effect: Effect, features: RecordFeatures) -> Candi
 
 
 def _best(found: Sequence[CandidateScore]) -> CandidateScore:
-    """The best of one effect's, and the start of the next of another shape: a prediction that far is rough."""
+    """The best of one effect's; if not from there, from its probe, or from the next of another shape."""
     best = max(found, key=lambda f: f.reduction)
     shape = [f"{best.effect.name}.{p.name}" for p in best.effect.parameters if p.null is None]
-    others = [f for f in found if any(f.start[key] != best.start[key] for key in shape)]
-    other = max(others, key=lambda f: f.reduction, default=None)
-    if other is None or other.reduction < AS_WELL * best.reduction:
-        return best
-    return replace(best, or_from=other.start)
+    next_best = max(
+        (f for f in found if any(f.start[key] != best.start[key] for key in shape)),
+        key=lambda f: f.reduction,
+        default=best,
+    )
+    more = (next_best.start,) if next_best is not best and next_best.reduction > AS_WELL * best.reduction else ()
+    return replace(best, others=(*best.others, *more))
 
 
 def _predict(at: Linearisation, plant: Plant, effect: Effect, group: list[Probe]) -> CandidateScore | None:
@@ -96,7 +98,8 @@ def _predict(at: Linearisation, plant: Plant, effect: Effect, group: list[Probe]
     gain = normal.reduction(change) - alone.reduction(bounded_step(alone, at.parameters))
     for p, amount in zip(group, change[own:].tolist(), strict=True):
         start[p.moved] = between(p.null, p.values[p.moved], amount, _parameter(effect, p).default)
-    return CandidateScore(effect, gain, start)
+    probed = {**start, **{p.moved: p.values[p.moved] for p in group}}
+    return CandidateScore(effect, gain, start, () if probed == start else (probed,))
 
 
 def _as_observed(at: Linearisation, change: list[Array]) -> float:

@@ -413,9 +413,12 @@ class Search:
         every: list[CandidateRefit] = []
         self.tried = (base, every)
         for number, s in enumerate(best):
-            starts = [s.start, s.or_from] if s.or_from is not None and number < FULL else [s.start]
-            tried = [self.refit(base, replace(s, start=start)) for start in starts]
-            every.append(min(tried, key=lambda r: r.misfit.total))
+            found = self.refit(base, s)
+            for start in s.others if number < FULL else ():
+                if base.misfit.fit - found.misfit.fit < NEAR * s.reduction:
+                    again = self.refit(base, replace(s, start=start))
+                    found = min(found, again, key=lambda r: r.misfit.total)
+            every.append(found)
             self.say.reached(self._added(every[-1].refit.model), every[-1].misfit)
         pairs = zip(every, best, strict=True)
         refits = [r for r, s in pairs if not observed(s.effect) or base.misfit.total - r.misfit.total > least]
