@@ -14,6 +14,7 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search.holdout import Split
 from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, RecordingFault
 from hydraulic_sysid.diagnosis.search.search import together
+from hydraulic_sysid.diagnosis.search.set_aside import accidents
 from hydraulic_sysid.diagnosis.search.verdict import set_aside_sentences
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations, minimise
@@ -22,7 +23,7 @@ from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.projection import Projection
 from hydraulic_sysid.estimation.recording import Reading
-from hydraulic_sysid.estimation.refinement import usable
+from hydraulic_sysid.estimation.refinement import but_accidents, far_off
 from hydraulic_sysid.estimation.segments import cut
 
 Array = np.ndarray
@@ -208,22 +209,24 @@ def test_the_residual_of_a_run_is_that_of_its_parts() -> None:
 @pytest.mark.parametrize(("far", "left_out"), [(0, 0), (1, 1), (2, 2), (3, 0), (8, 0)])
 def test_only_what_may_be_an_accident_is_set_aside(far: int, left_out: int) -> None:
     """Of a hundred segments two may be; where more are far off something acts there."""
-    costs = np.ones(100)
-    costs[50 : 50 + far] = 1e3
-    found = usable([costs[:40], costs[40:]])
+    squares = np.ones(100)
+    squares[50 : 50 + far] = 1e3
+    near = ~far_off(squares, squares)
+    found = but_accidents([near[:40], near[40:]])
     assert [len(f) for f in found] == [40, 60]
     assert int(np.sum(~np.concatenate(found))) == left_out
 
 
 def test_one_segment_of_few_may_be_an_accident_and_is_named() -> None:
     (segments,) = cut([simulated({}, seconds=8.0)], "hydraulic", 0.5)
-    costs = np.ones(len(segments))
-    costs[2] = 1e3
-    (kept,) = usable([costs])
+    near = np.arange(len(segments)) != 2
+    (kept,) = but_accidents([near])
     assert np.flatnonzero(~kept).tolist() == [2]
     after = Split([segments], [np.ones(len(segments), dtype=bool)]).judged([segments], [kept])
     assert len(after.segments[0]) == len(segments) - 1
-    (aside,) = after.set_aside
+    (left_out,) = after.far_off
+    (aside,) = accidents(left_out, np.ones(1, dtype=bool))
     assert (aside.record, aside.reason) == ("simulated", "far off")
     assert aside.time == pytest.approx(segments.first[2] * DT) and aside.seconds == pytest.approx(0.5, rel=0.05)
     assert "of simulated are far off all else, from" in set_aside_sentences([aside])[0]
+    assert not accidents(left_out, np.zeros(1, dtype=bool))  # what was found explains it

@@ -78,28 +78,34 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
 
 
 def usable(point: FitPoint, found: Sequence[Segments]) -> list[Mask]:
-    """Which segments are to be judged: (S,) per record; ``found`` are the point's with their outliers.
+    """Which segments are to be judged: (S,) per record; ``found`` are the point's with their outliers."""
+    return but_accidents(_near(point, [s.outliers for s in found]))
 
-    Not the few that are far off all others, as after a knock on the bench. Where many are, something acts there that
-    the model does not have.
+
+def but_accidents(near: Sequence[Mask]) -> list[Mask]:
+    """All segments (S,) but the few that are not ``near``, as after a knock on the bench.
+
+    Where many are not, something acts there that the model does not have.
     """
-    near = _near(point, [s.outliers for s in found])
     every = np.concatenate(near)
-    if np.count_nonzero(~every) <= max(1.0, ACCIDENTS * every.size):
-        return near
-    return [np.ones_like(n) for n in near]
+    accident = np.count_nonzero(~every) <= max(1.0, ACCIDENTS * every.size)
+    return [n if accident else np.ones_like(n) for n in near]
 
 
 def _near(point: FitPoint, spikes: Sequence[Mask]) -> list[Mask]:
     """Which segments (S,) are not far off all others, whatever the samples that are spikes (S, samples, C) say."""
     segments = point.shooting.segments
-    costs = [
-        np.sum(np.where(own, 0.0, s.by_channel(p.residual)) ** 2, axis=(1, 2))
-        / np.maximum(np.sum(~own, axis=(1, 2)), 1)
-        for s, p, own in zip(segments, point.projections, spikes, strict=True)
+    left = [
+        np.where(out, 0.0, s.by_channel(p.residual))
+        for s, p, out in zip(segments, point.projections, spikes, strict=True)
     ]
-    most = FAR_OFF * float(np.quantile(np.concatenate(costs), 0.9))
-    return [c <= most for c in costs]
+    squares = [np.mean(one**2, axis=(1, 2)) for one in left]
+    return [~far_off(own, np.concatenate(squares)) for own in squares]
+
+
+def far_off(squares: Array, every: Array) -> Mask:
+    """Which segments' mean squares (S,) are far off those of all others (N,)."""
+    return np.asarray(squares > FAR_OFF * float(np.quantile(every, 0.9)))
 
 
 def _spikes(point: FitPoint, left: Sequence[Array], channels: Sequence[str]) -> list[Mask]:

@@ -22,7 +22,7 @@ from hydraulic_sysid.diagnosis.check import resonance
 from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.segments import MEASURED, Segments, cut, spread
 
-from .set_aside import SetAside, far_off, set_aside
+from .set_aside import SetAside, set_aside
 
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
@@ -39,6 +39,8 @@ class Split:
     fit: list[Mask]
     set_aside: Sequence[SetAside] = ()
     """What of the records is not judged at all."""
+    far_off: Sequence[Segments] = ()
+    """Segments that were left out, since the model was far off in these few alone."""
 
     @property
     def to_fit(self) -> list[Segments]:
@@ -56,9 +58,9 @@ class Split:
     def judged(self, segments: Sequence[Segments], usable: Sequence[Mask]) -> Split:
         """The same roles for segments of which more is known, without those that are not ``usable[i]`` (S_i,)."""
         kept = [s.subset(u) for s, u in zip(segments, usable, strict=True)]
-        aside = [a for s, u in zip(segments, usable, strict=True) for a in far_off(s, u)]
+        far = [s.subset(~u) for s, u in zip(segments, usable, strict=True) if not u.all()]
         fit = [f[u] for f, u in zip(self.fit, usable, strict=True)]
-        return replace(self, segments=kept, fit=fit, set_aside=[*self.set_aside, *aside])
+        return replace(self, segments=kept, fit=fit, far_off=[*self.far_off, *far])
 
     @property
     def interval(self) -> float:

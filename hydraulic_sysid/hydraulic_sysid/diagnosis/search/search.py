@@ -19,9 +19,9 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.errors import SegmentError
-from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
+from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.parameters import bounded
-from hydraulic_sysid.estimation.refinement import refined, usable
+from hydraulic_sysid.estimation.refinement import far_off, refined, usable
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
 from .candidates import candidates, delays, observed, subsystem
@@ -47,6 +47,7 @@ from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import immaterial, negligible, remainders
 from .score_test import CandidateScore, score
 from .search_state import CandidateRefit, FaultFit, SearchResult, SearchState
+from .set_aside import accidents
 from .spectral_lines import record_features
 from .uncertainty import parameter_errors
 from .worth import (
@@ -470,7 +471,7 @@ class Search:
         :raises OutOfTimeError: before there was anything.
         """
         try:
-            return self.set_against_faults(self.concluded(decisive(self.searched())))
+            return accidents_named(self.set_against_faults(self.concluded(decisive(self.searched()))))
         except (OutOfTimeError, KeyboardInterrupt):
             if not self.path:
                 raise
@@ -488,7 +489,7 @@ class Search:
         names = [_new(state, former) for former, state in zip(path, path[1:], strict=False)]
         misfits = {name: state.misfit for name, state in zip(names, path[1:], strict=True)}
         found = SearchResult(self.given, self.split, self.settings, path[0], path[-1], misfits, {}, stopped=True)
-        return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
+        return accidents_named(replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded))
 
     def searched(self) -> SearchResult:
         """The search itself, the data sheet as loose as it was taken."""
@@ -562,7 +563,7 @@ class Search:
         final = self.judged(self.state(tried.refit.model))
         base = replace(self.state(base.model, self._last), refits=[tried], scores=scores)
         found = SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
-        return self.concluded(found)
+        return accidents_named(self.concluded(found))
 
     def _reviewed(
         self, base: SearchState, state: SearchState, added: list[str], competing: dict[str, SearchState]
@@ -614,6 +615,21 @@ class Search:
             except SimulationError:  # with the values that it has beside the others
                 found[name] = next(reversed(found.values()), base.misfit)
         return {**found, **{name: final.misfit for name in order[-1:]}}
+
+
+def accidents_named(found: SearchResult) -> SearchResult:
+    """With the segments set aside that were left out as far off, and still are with what was found."""
+    at, final = found.final.linearisation, found.final.misfit
+    if not found.split.far_off:
+        return found
+    again = FitPoint.begin(Plant.for_fits(at.model), found.split.far_off, ()).at_rest()
+    usual = final.by_segment / final.counted
+    named = [
+        one
+        for s, p in zip(found.split.far_off, again.projections, strict=True)
+        for one in accidents(s, far_off(np.sum(p.residual**2, axis=1) / s.counted, usual))
+    ]
+    return replace(found, split=replace(found.split, set_aside=[*found.split.set_aside, *named]))
 
 
 def _worse(misfit: Misfit, best: Misfit) -> bool:

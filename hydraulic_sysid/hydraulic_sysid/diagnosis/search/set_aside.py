@@ -56,10 +56,10 @@ def set_aside(model: Model, records: Sequence[Record], length: float) -> tuple[l
     return masks, found
 
 
-def far_off(segments: Segments, usable: Mask) -> list[SetAside]:
-    """The segments that are not ``usable`` (S,)."""
+def accidents(segments: Segments, far: Mask) -> list[SetAside]:
+    """The segments that are ``far`` (S,) off all others."""
     out: Mask = np.zeros(len(segments.record), dtype=bool)
-    for first in segments.first[~usable].tolist():
+    for first in segments.first[far].tolist():
         out[first : first + segments.samples] = True
     return _noted(segments.record, "position", FAR_OFF, out)
 
