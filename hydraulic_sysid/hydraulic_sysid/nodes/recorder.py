@@ -16,8 +16,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import rclpy
-from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
@@ -119,12 +117,7 @@ def main(argv: list[str] | None = None) -> int:
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    try:
-        node = Recorder()
-    except (ParameterException, ValueError, OSError) as error:
-        print(f"recorder: {error}", file=sys.stderr)
-        rclpy.try_shutdown()
-        return 2
+    node = command_line.make(Recorder)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     while not (stop.is_set() or node.done):

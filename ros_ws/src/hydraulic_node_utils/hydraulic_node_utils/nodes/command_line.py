@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
 
 import rclpy
+from rclpy.exceptions import ParameterException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from hydraulic_node_utils.nodes import middleware, rclpy_internals
 from hydraulic_node_utils.nodes.log_callers import know_log_callers
 from hydraulic_node_utils.parameter_spec import ParameterSpec
+
+N = TypeVar("N")
 
 
 def parser(description: str, parameters: Sequence[ParameterSpec]) -> argparse.ArgumentParser:
@@ -44,3 +49,13 @@ def start(options: argparse.ArgumentParser, argv: list[str] | None) -> argparse.
         options.error(f"ROS arguments: {' '.join(str(error).split())}")
     know_log_callers()
     return given
+
+
+def make(node: Callable[[], N]) -> N:
+    """The node, once `start` has been called; leaves with exit code 2 where it or the middleware refuses to be made."""
+    try:
+        return node()
+    except (ParameterException, ValueError, OSError, RuntimeError) as error:  # the last: of rcl
+        print(f"{Path(sys.argv[0]).stem}: {' '.join(str(error).split())}", file=sys.stderr)
+        rclpy.try_shutdown()
+        sys.exit(2)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import gc
 import signal
-import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import rclpy
-from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor
 from rclpy.node import Node
 
@@ -47,14 +44,9 @@ def serve(
     parameters: Sequence[ParameterSpec],
     argv: list[str] | None,
 ) -> int:
-    """Run the node (`Served`) until it is over; its exit code, or 2 for what it refuses when it is made."""
+    """Run the node (`Served`) until it is over; its exit code."""
     command_line.start(command_line.parser(description, parameters), argv)
-    try:
-        node = make_node()
-    except (ParameterException, ValueError) as error:
-        print(f"{error}", file=sys.stderr)
-        rclpy.try_shutdown()
-        return 2
+    node = command_line.make(make_node)
     caught: list[str] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda signum, _: caught.append(signal.Signals(signum).name))

@@ -8,8 +8,6 @@ import sys
 import threading
 import traceback
 
-import rclpy
-from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
@@ -35,12 +33,7 @@ def run_plant(backend: PlantBackend, description: str, argv: list[str] | None = 
     parser.add_argument("--lockstep", action="store_true", help="plant time waits for the answer to each state")
     options = command_line.start(parser, argv)
     overrides = [Parameter(name, value=True) for name in ("autostart", "lockstep") if getattr(options, name)]
-    try:
-        node = PlantNode(backend, parameter_overrides=overrides)
-    except (ParameterException, ValueError) as error:
-        print(f"bad parameter: {error}", file=sys.stderr)
-        rclpy.try_shutdown()
-        return 2
+    node = command_line.make(lambda: PlantNode(backend, parameter_overrides=overrides))
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
