@@ -98,6 +98,30 @@ def test_a_node_may_do_all_that_it_does(policy: dict[str, Any], name: str, tmp_p
         rclpy.try_shutdown()
 
 
+def test_the_permissions_made_of_it_are_those_of_the_policy(policy: dict[str, Any], tmp_path: Path) -> None:
+    pytest.importorskip("sros2")
+    keys = tmp_path / "keys"
+    for arguments in (["create_keystore", str(keys)], ["generate_artifacts", "-k", str(keys), "-p", str(POLICY)]):
+        made = subprocess.run(["ros2", "security", *arguments], capture_output=True, text=True, check=False)
+        assert made.returncode == 0, made.stdout + made.stderr
+    for node, allowed in policy.items():
+        folder = keys / "enclaves" / "actuator" / node
+        assert {"cert.pem", "key.pem", "governance.p7s", "permissions.p7s"} <= {file.name for file in folder.iterdir()}
+        permissions = Tree.parse(folder / "permissions.xml").getroot()
+        assert permissions.findtext(".//default") == "DENY"
+        expected = {
+            "publish": {f"rt{name}" for name in allowed["publish"]}
+            | {f"rr{name}Reply" for name in allowed["reply"]}
+            | {f"rq{name}Request" for name in allowed["request"]},
+            "subscribe": {f"rt{name}" for name in allowed["subscribe"]}
+            | {f"rq{name}Request" for name in allowed["reply"]}
+            | {f"rr{name}Reply" for name in allowed["request"]},
+        }
+        for what, topics in expected.items():
+            given = {str(entry.text) for block in permissions.iter(what) for entry in block.iter("topic")}
+            assert given == topics | {"ros_discovery_info"}, f"{node}: {what}"
+
+
 @pytest.mark.parametrize(
     "module", ["hydraulic_sim.nodes.simulator", "hydraulic_control.nodes.controller", "hydraulic_sysid.nodes.recorder"]
 )
