@@ -1,10 +1,11 @@
 """How fast a piston meets its stop, whoever commands: random and hostile streams of commands through the command gate.
 
-    python benchmarks/end_stops.py [--streams 1000] [--seconds 3] [--seed 2026] [--unlimited]
+    python benchmarks/end_stops.py [--streams 1000] [--seconds 3] [--seed 2026] [--bench NAME …] [--unlimited]
 
-The limits are those of the shipped bus file, the pistons those of the shipped presets of the same bench, half of them
-as built. Most streams start near an end. Printed is the distribution of the speed at contact, per kind of stream; the
-exit code is 1 where one is beyond the impact speed of the bus file.
+Benches: ``bus``, with the limits of the shipped bus file and the pistons of the bench that it is for, half of them as
+built; and every shipped model, with the limits that the simulator takes from it for the same impact speed. Most streams
+start near an end. Printed is the distribution of the speed at contact, per kind of stream; the exit code is 1 where one
+is beyond the impact speed.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -26,7 +28,8 @@ from hydraulic_interfaces.samples import Command
 from hydraulic_plant_node.command_gate import CommandGate
 from hydraulic_plant_node.travel_limits import EndsOfTravel, TravelLimits
 from hydraulic_sim.live import LivePlant
-from hydraulic_sim.model_file import load_model
+from hydraulic_sim.model_file import load_model, presets
+from hydraulic_sim.nodes import simulator
 from hydraulic_sim.plant import Plant
 
 RATES_HZ = (500.0, 1000.0)
@@ -97,6 +100,14 @@ def plant(model: str, rate: float) -> Plant:
     return Plant.at_rate(load_model(model), rate)
 
 
+@dataclass(frozen=True)
+class Bench:
+    """Limits, and the pistons that they are tried on."""
+
+    ends: EndsOfTravel
+    models: tuple[str, ...]
+
+
 def ends_of_the_shipped_bench() -> EndsOfTravel:
     """What the shipped bus file says."""
     ends = load_bus("bench").limits.braking
@@ -104,11 +115,27 @@ def ends_of_the_shipped_bench() -> EndsOfTravel:
     return ends
 
 
-def impact(seed: int, ends: EndsOfTravel, limited: bool = True, seconds: float = 3.0) -> tuple[str, float]:
+def simulated(model: str, impact_speed: float) -> EndsOfTravel:
+    """What the simulator takes from a model file."""
+    plant = simulator.Simulator()
+    defaults = {spec.name: spec.default for spec in plant.parameters()}
+    plant.configure({**defaults, "model": model, "rate": RATES_HZ[0], "impact_speed": impact_speed})
+    ends = plant.ends_of_travel()
+    assert ends is not None
+    return ends
+
+
+def benches() -> dict[str, Bench]:
+    """All that are shipped."""
+    bus = ends_of_the_shipped_bench()
+    return {"bus": Bench(bus, MODELS), **{m: Bench(simulated(m, bus.impact_speed), (m,)) for m in presets()}}
+
+
+def impact(seed: int, bench: Bench, limited: bool = True, seconds: float = 3.0) -> tuple[str, float]:
     """Kind of the stream, and the greatest speed [m/s] towards a stop in contact with it; 0 where it was not met."""
-    rng = np.random.default_rng(seed)
+    rng, ends = np.random.default_rng(seed), bench.ends
     kind, rate = KINDS[rng.integers(len(KINDS))], float(rng.choice(RATES_HZ))
-    body = plant(str(rng.choice(MODELS)), rate)
+    body = plant(str(rng.choice(bench.models)), rate)
     near = rng.choice([-1.0, 1.0]) * (ends.high - 0.04 * rng.random() ** 2)
     start = float(near if rng.random() < 0.7 else rng.uniform(ends.low, ends.high))
     live = LivePlant(body, body.initial_state(position=start))
@@ -139,18 +166,11 @@ def cost(ends: EndsOfTravel, count: int = 200_000) -> float:
     return (time.perf_counter() - begun) / count
 
 
-def main() -> int:
-    """Print the distribution; 1 where a piston met its stop too fast."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--streams", type=int, default=1000)
-    parser.add_argument("--seconds", type=float, default=3.0)
-    parser.add_argument("--seed", type=int, default=2026)
-    parser.add_argument("--unlimited", action="store_true", help="without the limits, for comparison")
-    options = parser.parse_args()
-    ends = ends_of_the_shipped_bench()
+def tell(bench: Bench, options: argparse.Namespace) -> float:
+    """Print the distribution; the greatest speed at a contact."""
     found: dict[str, list[float]] = {kind.__name__: [] for kind in KINDS}
     for seed in range(options.seed, options.seed + options.streams):
-        kind, speed = impact(seed, ends, not options.unlimited, options.seconds)
+        kind, speed = impact(seed, bench, not options.unlimited, options.seconds)
         found[kind].append(speed)
     print(f"{'stream':10} {'runs':>5} {'contact':>8} {'p50 mm/s':>9} {'p99 mm/s':>9} {'max mm/s':>9}")
     everything = [speed for speeds in found.values() for speed in speeds]
@@ -159,8 +179,28 @@ def main() -> int:
         contacts = sum(speed > 0.0 for speed in speeds)
         p50, p99 = np.quantile(met, [0.5, 0.99])
         print(f"{name:10} {len(speeds):5} {contacts:8} {p50:9.1f} {p99:9.1f} {met.max():9.1f}")
-    print(f"allowed: {1e3 * ends.impact_speed:g} mm/s; the limits take {1e6 * cost(ends):.2f} us per sample")
-    return int(max(everything) > ends.impact_speed)
+    return max(everything)
+
+
+def main() -> int:
+    """Print the distributions; 1 where a piston met its stop too fast."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    shipped = benches()
+    parser.add_argument("--streams", type=int, default=1000, help="on each bench")
+    parser.add_argument("--seconds", type=float, default=3.0)
+    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--bench", nargs="+", choices=list(shipped), default=list(shipped))
+    parser.add_argument("--unlimited", action="store_true", help="without the limits, for comparison")
+    options = parser.parse_args()
+    late = []
+    for name in options.bench:
+        bench = shipped[name]
+        print(f"== {name}: allowed are {1e3 * bench.ends.impact_speed:g} mm/s", flush=True)
+        if tell(bench, options) > bench.ends.impact_speed:
+            late.append(name)
+    print(f"the limits take {1e6 * cost(shipped['bus'].ends):.2f} us per sample")
+    print("faster than allowed: " + (", ".join(late) or "none"))
+    return int(bool(late))
 
 
 if __name__ == "__main__":

@@ -6,9 +6,9 @@ Killed are in turn the plant, the recorder, and what commands: the excitation in
 second. Only what was killed is started again. After each kill is looked at:
 
 - of what commands: when the drive in `state` is 0 V, from the kill on; at most the watchdog time and what was under way
-  (``--allowance``);
-- of the recorder: `recover` saves the bag, no message is missing up to its last one, and how long before the kill that
-  is;
+  (``--allowance``); and that the plant goes on: how long it paused around the kill, beside how long without one;
+- of the recorder: `recover` saves the bag, it can be read, no message is missing up to its last one, and that came a
+  second before the kill at most;
 - of the plant: the next one comes up disabled, and stays at 0 V while everybody goes on commanding, until `enable`.
 
 Exit code 1 where something is not so.
@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import math
 import os
 import random
@@ -26,12 +27,12 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from domain_coordinator import domain_id
 from mcap.reader import make_reader
+from std_msgs.msg import String
 
 from abuse.running import SECOND, Observer, Process, RunningError
 from hydraulic_control.reference_intake import PAUSE_S
@@ -39,6 +40,7 @@ from hydraulic_interfaces.contract import WATCHDOG_S, find_topic, topic
 from hydraulic_interfaces.conversions import ReferenceEncoder, interface_class
 from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes import middleware
 from hydraulic_sysid.data.bag.recovery import recover
 from hydraulic_sysid.data.records import read_records
 
@@ -52,6 +54,8 @@ rest_before: 0.0
 """
 AMPLITUDE_M, FREQUENCY_HZ = 0.1, 0.5
 PATIENCE_S = 120.0  # with a start on a busy machine
+LOOK_NS = SECOND // 2
+CRASH_S = 1.0  # what a crash may cost, as the recorder says
 
 
 class Bench:
@@ -63,8 +67,12 @@ class Bench:
         self.observer = Observer()
         self.problems: list[str] = []
         self.delays_ms: dict[str, list[float]] = {"excitation": [], "controller": []}
+        self.pauses_ms: dict[str, list[float]] = {"before": [], "after": []}
         self.tails_s: list[float] = []
         self.bags = 0
+        self.recorded: dict[str, int] = {}
+        """Bag → stamp of the first state that the recorder said it had."""
+        self.observer.node.create_subscription(String, "recorder/status", self._hear, profile("latched"))
         (folder / "plan.yaml").write_text(PLAN)
         row = find_topic("reference")
         self._references = self.observer.node.create_publisher(
@@ -82,7 +90,7 @@ class Bench:
         """Start a process."""
         module, parameters, options = {
             "plant": ("hydraulic_sim.nodes.simulator", (), ("--autostart",)),
-            "recorder": ("hydraulic_sysid.nodes.recorder", (f"output:={self.folder / f'bag{self.bags}'}",), ()),
+            "recorder": ("hydraulic_sysid.nodes.recorder", (f"output:={self.bag}",), ()),
             "excitation": ("hydraulic_sysid.nodes.excitation", self._played(), ()),
             "controller": (
                 "hydraulic_control.nodes.controller",
@@ -91,6 +99,16 @@ class Bench:
             ),
         }[name]
         self.processes[name] = Process(name, self.folder, module, *parameters, options=options)
+
+    @property
+    def bag(self) -> Path:
+        """What is being recorded."""
+        return self.folder / f"bag{self.bags}"
+
+    def _hear(self, message: String) -> None:
+        said = json.loads(message.data)
+        if said.get("reached_ns"):
+            self.recorded.setdefault(said["output"], said["reached_ns"])
 
     def _played(self) -> tuple[str, ...]:
         return f"plan:={self.folder / 'plan.yaml'}", "autostart:=true", "exit_when_done:=true", "start_timeout:=60.0"
@@ -103,7 +121,7 @@ class Bench:
         self._references.publish(self._encode(now, AMPLITUDE_M * math.sin(phase), speed))
 
     def bring_up(self, source: str) -> None:
-        """Everything runs, the plant is enabled and moves."""
+        """Everything runs, the plant is enabled and moves, and that is recorded."""
         for other in {"excitation", "controller"} - {source}:
             if other in self.processes:
                 self.processes[other].end()
@@ -125,6 +143,7 @@ class Bench:
                 self.observer.each = self.refer
             with contextlib.suppress(RunningError):
                 self.observer.wait(self.moves, "a drive", 8.0)
+        self.observer.wait(lambda: str(self.bag) in self.recorded, "a recorder that has states", PATIENCE_S)
 
     def moves(self) -> bool:
         """Whether a drive has been applied within the last tenth of a second."""
@@ -142,15 +161,21 @@ class Bench:
             self._after_source(victim, at)
 
     def _after_source(self, victim: str, at: int) -> None:
-        time.sleep(0.4)
+        self.observer.wait(lambda: self.observer.since(at + LOOK_NS), f"states after the kill of the {victim}")
         seen = self.observer.since(at)
         last = max((stamp for _, stamp, drive, _ in seen if drive != 0.0), default=at)
         delay = (last - at) / SECOND
         self.delays_ms[victim].append(1e3 * delay)
-        if len(seen) < 100:
-            self.problems.append(f"{victim}: the plant went silent, too ({len(seen)} states)")
+        self.pauses_ms["before"].append(self._longest_pause(at - LOOK_NS, at))
+        self.pauses_ms["after"].append(self._longest_pause(at, at + LOOK_NS))
         if delay > WATCHDOG_S + self.allowance:
             self.problems.append(f"{victim}: a drive was applied {1e3 * delay:.1f} ms after the kill")
+
+    def _longest_pause(self, begin: int, end: int) -> float:
+        """Between two states [ms]."""
+        stamps = np.array([stamp for _, stamp, _, _ in self.observer.since(begin)])
+        first = int(np.searchsorted(stamps, end))
+        return float(1e-6 * np.diff(stamps[: first + 1]).max(initial=0))
 
     def _after_plant(self) -> None:
         begun = time.time_ns()
@@ -161,27 +186,30 @@ class Bench:
             self.problems.append(f"plant: the next one applied {max(map(abs, driven)):.3g} V before it was enabled")
 
     def _after_recorder(self, at: int) -> None:
-        bag = self.folder / f"bag{self.bags}"
+        bag = self.bag
         self.bags += 1
+        last = self.recorded[str(bag)]
         try:
             recover(bag)
-            for record in read_records(bag):
+            runs = _sequences(bag)
+            for publisher, numbers in enumerate(runs):
+                counted = np.unique([number for number, _ in numbers])
+                last = max(last, *(stamp for _, stamp in numbers))
+                if lost := int(np.ptp(counted)) + 1 - counted.size:
+                    self.problems.append(f"recorder: {lost} messages are missing in {bag.name}, run {publisher}")
+            # Where a plant was killed or held up, a new record begins.
+            for record in read_records(bag, "split") if runs else ():
                 if not all(np.isfinite(values).all() for values in record.channels.values()):
                     self.problems.append(f"recorder: {record.name} is not finite")
         except HydraulicError as error:
-            if "samples are missing" not in str(error):  # of a plant that was killed meanwhile
-                self.problems.append(f"recorder: {error}")
-        last = 0
-        for publisher, numbers in _sequences(bag):
-            counted = np.unique([number for number, _ in numbers])
-            last = max(last, *(stamp for _, stamp in numbers))
-            if lost := int(np.ptp(counted)) + 1 - counted.size:
-                self.problems.append(f"recorder: {lost} messages are missing in {bag.name}, run {publisher}")
+            self.problems.append(f"recorder: {error}")
         self.tails_s.append((at - last) / SECOND)
+        if self.tails_s[-1] > CRASH_S:
+            self.problems.append(f"recorder: {bag.name} ends {self.tails_s[-1]:.2f} s before the kill")
         shutil.rmtree(bag)
 
 
-def _sequences(bag: Path) -> Iterator[tuple[int, list[tuple[int, int]]]]:
+def _sequences(bag: Path) -> list[list[tuple[int, int]]]:
     """Publisher's counts and stamps of `state`, for each plant that there was: its count begins anew."""
     runs: list[list[tuple[int, int]]] = [[]]
     with next(bag.glob("*.mcap")).open("rb") as stream:
@@ -189,7 +217,7 @@ def _sequences(bag: Path) -> Iterator[tuple[int, list[tuple[int, int]]]]:
             if runs[-1] and message.sequence < runs[-1][-1][0]:
                 runs.append([])
             runs[-1].append((message.sequence, message.publish_time))
-    return ((number, run) for number, run in enumerate(runs) if run)
+    return [run for run in runs if run]
 
 
 def run(bench: Bench, count: int) -> int:
@@ -219,7 +247,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--allowance", type=float, default=0.01, help="beyond the watchdog [s] (default 0.01)")
     options = parser.parse_args()
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    middleware.set_up()
     began = time.monotonic()
     with domain_id() as domain, tempfile.TemporaryDirectory() as name:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
@@ -234,6 +262,10 @@ def main() -> int:
         if delays:
             figures = f"{statistics.median(delays):.1f} ms after the kill, at most {max(delays):.1f} ms"
             print(f"  {victim:<11} {len(delays):>3} times: last drive {figures}")
+    for when, pauses in bench.pauses_ms.items():
+        if pauses:
+            figures = f"{statistics.median(pauses):.1f} ms in the median, {max(pauses):.1f} ms at most"
+            print(f"  plant       longest pause within {LOOK_NS / SECOND:g} s {when} a kill: {figures}")
     if tails := bench.tails_s:
         figures = f"{statistics.median(tails):.2f} s before the kill, at most {max(tails):.2f} s"
         print(f"  recorder    {len(tails):>3} times: the bag ends {figures}")

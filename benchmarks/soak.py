@@ -29,6 +29,7 @@ from abuse.running import SECOND, Observer, Process, memory_mb
 from hydraulic_interfaces.contract import find_topic, topic
 from hydraulic_interfaces.conversions import ReferenceEncoder, interface_class
 from hydraulic_interfaces.qos import profile
+from hydraulic_node_utils.nodes import middleware
 
 STREAMS = ("state", "pressure_a", "pressure_b", "pressure_supply", "command")
 PERIOD_S = 10.0
@@ -133,7 +134,7 @@ def main() -> int:
     parser.add_argument("--load", type=int, default=os.cpu_count() or 1, help="busy processes beside the bench")
     parser.add_argument("--flat", type=float, default=2.0, help="growth that counts as none [MB in 10 min] (default 2)")
     options = parser.parse_args()
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    middleware.set_up()
     problems: list[str] = []
     with domain_id() as domain, tempfile.TemporaryDirectory() as name:
         os.environ["ROS_DOMAIN_ID"] = str(domain)

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import pytest
 
-from end_stops import KINDS, MODELS, ends_of_the_shipped_bench, impact, plant
+from end_stops import KINDS, MODELS, benches, ends_of_the_shipped_bench, impact, plant
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_plant_node.travel_limits import TravelLimits
 from hydraulic_sim.live import LivePlant
 
 
 def test_no_stream_of_commands_drives_the_piston_into_its_stop() -> None:
-    ends = ends_of_the_shipped_bench()
-    found = [impact(seed, ends, seconds=1.0) for seed in range(40)]
+    bench = benches()["bus"]
+    found = [impact(seed, bench, seconds=1.0) for seed in range(40)]
     assert {kind for kind, _ in found} == {kind.__name__ for kind in KINDS}
     assert sum(speed > 0.0 for _, speed in found) > 5, "some do meet it"
-    assert max(speed for _, speed in found) <= ends.impact_speed
+    assert max(speed for _, speed in found) <= bench.ends.impact_speed == pytest.approx(0.05)
 
 
 def test_without_the_limits_the_same_streams_do() -> None:
-    ends = ends_of_the_shipped_bench()
-    speeds = [impact(seed, ends, limited=False, seconds=1.0)[1] for seed in range(10)]
+    speeds = [impact(seed, benches()["bus"], limited=False, seconds=1.0)[1] for seed in range(10)]
     assert max(speeds) > 0.3
-    assert ends.impact_speed == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("distance", [0.1, 0.05, 0.02, 0.005])
