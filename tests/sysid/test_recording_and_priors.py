@@ -23,7 +23,7 @@ from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.projection import Projection
 from hydraulic_sysid.estimation.recording import Reading
-from hydraulic_sysid.estimation.refinement import but_accidents, far_off
+from hydraulic_sysid.estimation.refinement import but_accidents, outlying
 from hydraulic_sysid.estimation.segments import cut
 
 Array = np.ndarray
@@ -211,7 +211,7 @@ def test_only_what_may_be_an_accident_is_set_aside(far: int, left_out: int) -> N
     """Of a hundred segments two may be; where more are far off something acts there."""
     squares = np.ones(100)
     squares[50 : 50 + far] = 1e3
-    near = ~far_off(squares, squares)
+    near = ~outlying(squares, squares)
     found = but_accidents([near[:40], near[40:]])
     assert [len(f) for f in found] == [40, 60]
     assert int(np.sum(~np.concatenate(found))) == left_out

@@ -19,7 +19,8 @@ def test_no_stream_of_commands_drives_the_piston_into_its_stop() -> None:
 
 
 def test_without_the_limits_the_same_streams_do() -> None:
-    speeds = [impact(seed, benches()["bus"], limited=False, seconds=1.0)[1] for seed in range(10)]
+    bench = benches()["bus"]
+    speeds = [impact(seed, bench, limited=False, seconds=1.0)[1] for seed in range(10)]
     assert max(speeds) > 0.3
 
 

@@ -25,7 +25,7 @@ LAW = 0.03  # share of itself by which every law may be off in a segment: no law
 TIMING = 0.3  # sampling intervals by which a channel may be late without further reason (order of conversion, filters)
 NEAR = 2.0  # residual over noise up to which a model says what delays there are
 HUM = 10.0  # standard deviations of the noise that a mains line may have in a segment
-FAR_OFF = 10.0  # times the cost of nine in ten segments: a segment that says nothing of the noise, …
+OUTLYING = 10.0  # times the cost of nine in ten segments: a segment that says nothing of the noise, …
 ACCIDENTS = 0.02  # … and is left out, if no more are than this share of all, or one
 
 
@@ -100,12 +100,12 @@ def _near(point: FitPoint, spikes: Sequence[Mask]) -> list[Mask]:
         for s, p, out in zip(segments, point.projections, spikes, strict=True)
     ]
     squares = [np.mean(one**2, axis=(1, 2)) for one in left]
-    return [~far_off(own, np.concatenate(squares)) for own in squares]
+    return [~outlying(own, np.concatenate(squares)) for own in squares]
 
 
-def far_off(squares: Array, every: Array) -> Mask:
+def outlying(squares: Array, every: Array) -> Mask:
     """Which segments' mean squares (S,) are far off those of all others (N,)."""
-    return np.asarray(squares > FAR_OFF * float(np.quantile(every, 0.9)))
+    return np.asarray(squares > OUTLYING * float(np.quantile(every, 0.9)))
 
 
 def _spikes(point: FitPoint, left: Sequence[Array], channels: Sequence[str]) -> list[Mask]:

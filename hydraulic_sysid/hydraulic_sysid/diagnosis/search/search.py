@@ -21,7 +21,7 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.parameters import bounded
-from hydraulic_sysid.estimation.refinement import far_off, refined, usable
+from hydraulic_sysid.estimation.refinement import outlying, refined, usable
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
 from .candidates import candidates, delays, observed, subsystem
@@ -622,12 +622,16 @@ def accidents_named(found: SearchResult) -> SearchResult:
     at, final = found.final.linearisation, found.final.misfit
     if not found.split.far_off:
         return found
-    again = FitPoint.begin(Plant.for_fits(at.model), found.split.far_off, ()).at_rest()
+    try:
+        again = FitPoint.begin(Plant.for_fits(at.model), found.split.far_off, ()).at_rest()
+        squares = [np.sum(p.residual**2, axis=1) for p in again.projections]
+    except SimulationError:  # it does not run there
+        squares = [np.full(len(s), np.inf) for s in found.split.far_off]
     usual = final.by_segment / final.counted
     named = [
         one
-        for s, p in zip(found.split.far_off, again.projections, strict=True)
-        for one in accidents(s, far_off(np.sum(p.residual**2, axis=1) / s.counted, usual))
+        for s, own in zip(found.split.far_off, squares, strict=True)
+        for one in accidents(s, outlying(own / s.counted, usual))
     ]
     return replace(found, split=replace(found.split, set_aside=[*found.split.set_aside, *named]))
 
