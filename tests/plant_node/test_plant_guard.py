@@ -51,6 +51,35 @@ def test_one_plant_per_namespace(plant: Callable[..., Any]) -> None:
     plant("/left").enter(VALUES, own_clock=True)
 
 
+def test_who_the_other_plant_is_may_come_to_be_known_later(ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    import rclpy
+    from rclpy.node import Node
+
+    from hydraulic_plant_node.nodes.plant_guard import PlantGuard
+
+    context, gate, names = rclpy.Context(), CommandGate(), ["plant", "_NODE_NAME_UNKNOWN_"]
+    monkeypatch.setattr(Node, "count_publishers", lambda *_: len(names))
+    monkeypatch.setattr(
+        Node,
+        "get_publishers_info_by_topic",
+        lambda _, topic: [SimpleNamespace(node_namespace="/left", node_name=n) for n in names if topic == "state"],
+    )
+    rclpy.init(context=context)
+    backend: Any = SimpleNamespace()
+    guard = PlantGuard(rclpy.create_node("plant", namespace="/left", context=context), gate, backend)
+    guard.serve()
+    guard.watch()
+    assert gate.stopped and not gate.enabled
+    names[1] = "impostor"
+    guard.watch()
+    assert gate.stop_reason.startswith("another plant: /left/impostor publishes /left/state")
+    gate.reset()
+    gate.stop("emergency stop")
+    guard.watch()
+    assert gate.stop_reason == "emergency stop"
+    rclpy.shutdown(context=context)
+
+
 def test_two_plants_do_not_set_one_clock(plant: Callable[..., Any]) -> None:
     plant("/left", own_clock=True)
     with pytest.raises(BackendError, match=r"another plant publishes /clock in domain .* \(-r /clock:=clock\)"):

@@ -38,7 +38,7 @@ class PlantGuard:
         self._claims: dict[str, NameClaim] = {}
         self._marker: RunMarker | None = None
         self._made, self._serves, self._watched = time.monotonic(), False, 0
-        self.not_heard = ""
+        self.not_heard = self._other = ""
 
     def enter(self, values: Mapping[str, Any], own_clock: bool) -> None:
         """Before the plant is configured with these parameters; a real one is stopped if its last run was not ended.
@@ -109,7 +109,9 @@ class PlantGuard:
         except BackendError as error:
             if self._serves:
                 gate.stop(str(error))
-                found["other plant"] = str(error)
+                if gate.stop_reason == self._other:  # who it is comes to be known a little after that it is there
+                    gate.stop_reason = str(error)
+                found["other plant"] = self._other = str(error)
         if self._watched % _LOOK_EVERY == 0:
             self.not_heard = self._not_heard()
         self._watched += 1
