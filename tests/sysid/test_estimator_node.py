@@ -20,7 +20,6 @@ from hydraulic_interfaces.conversions import command_to_message, from_time, samp
 from hydraulic_interfaces.qos import profile  # noqa: E402
 from hydraulic_interfaces.samples import Command  # noqa: E402
 from hydraulic_sysid.linear.models import ArxOrder, read_linear_model  # noqa: E402
-from hydraulic_sysid.linear.online import SlowSampler  # noqa: E402
 
 NODE = "/actuator/estimator"
 PERIOD_NS = 20_000_000
@@ -62,7 +61,8 @@ class Bench:
         self._command.publish(command_to_message(Command(stamp_ns, "test", float(drive))))
 
     def coefficients(self, count: int) -> None:
-        """Wait until that many sets of coefficients have come since."""
+        """Wait until that many sets of coefficients have come since every topic has been heard."""
+        self.wait_until(lambda: self.states and all(self.heard.values()), "every topic")
         heard = self.heard["model_parameters"]
         seen = len(heard)
         self.wait_until(lambda: len(heard) >= seen + count, f"{count} sets of coefficients")
@@ -130,13 +130,13 @@ def test_every_prediction_is_that_of_the_coefficients_before_it(bench: Bench) ->
     bench.coefficients(60)
     coefficients = {from_time(m.header.stamp): np.array(m.position) for m in list(bench.heard["model_parameters"])}
     fits = {from_time(m.header.stamp): m for m in list(bench.heard["model_fit"])}
-    grid = min(coefficients)
-    sampler = SlowSampler(PERIOD_NS, PERIOD_NS)
+    states = {from_time(m.header.stamp): sample_from_messages(m) for m in list(bench.states)}
+    step = round(1e9 / RATE)
     slow: dict[int, tuple[float, float]] = {}
-    for sample in map(sample_from_messages, list(bench.states)):
-        if sample.stamp_ns >= grid:
-            for s in sampler.take(sample.stamp_ns, sample.drive, sample.position):
-                slow[s.stamp_ns] = (s.drive, s.output)
+    for end in (stamp for stamp in states if stamp in fits or stamp in coefficients):
+        within = [end - PERIOD_NS + k * step for k in range(PERIOD_NS // step)]
+        if all(t in states for t in within):
+            slow[end] = (float(np.mean([states[t].drive for t in within])), states[end].position)
     compared = 0
     for stamp, fit in fits.items():
         past = [stamp - k * PERIOD_NS for k in (0, 1, 2)]
