@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -102,6 +104,20 @@ def test_directions_that_are_kept_lead_to_the_same_minimum(model: Model, segment
     again = fit_segments(plant.with_parameters(found.values), segments, [key], FitSettings())
     assert again.values[key] == pytest.approx(found.values[key], rel=1e-3)
     assert again.cost == pytest.approx(found.cost, rel=1e-4)
+
+
+def test_a_segment_that_begins_far_off_alone_finds_its_way(model: Model, segments: list[Segments]) -> None:
+    """Its share of the sum is too small for the directions of all to be taken anew."""
+    at = FitPoint.begin(Plant.for_fits(model), segments, ()).at_rest()
+    states = at.initial_states[0].copy()
+    states[7, :4] += [2e-3, -0.05, 1e6, -1e6]
+    raw = at.shooting.residuals(at.plant, [states])
+    away = replace(at, initial_states=[states], projections=[at.projections[0].with_raw(raw[0])])
+    assert worst(away) > 20.0
+    assert worst(away.unstuck()) < 1.05 * worst(at)
+    assert away.unstuck().cost < 1.001 * at.cost
+    others = np.arange(len(states)) != 7
+    assert np.array_equal(away.unstuck().initial_states[0][others], states[others])
 
 
 def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(

@@ -25,8 +25,11 @@ from .projection import Projection
 from .segments import Segments, cut, segment_length
 from .shooting import Shooting
 
-_SETTLED = 1e-4  # share of the cost below which moving initial states on gains no more
+_SETTLED = 1e-4  # share of a cost below which moving initial states on gains no more
 _ROUNDS = 4  # times that they are moved at most
+_STUCK = 2.0  # times the median mean square of the segments, from which initial states may be stuck; …
+_STUCK_ROUNDS = 10  # … times that they are moved at most, …
+_STUCK_SHARES = (1.0, 0.3, 0.1)  # … by which of the way that the directions show
 _NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured pressures go further
 # Of the sum of squares where the directions of the initial states were taken: below, they are taken anew …
 _OUTDATED = 0.8
@@ -118,14 +121,19 @@ class FitPoint:
         return [p.beyond(c) for p, c in zip(self.projections, columns, strict=True)]
 
     def settled(
-        self, shooting: Shooting, parameters: Parameters, initial_states: Sequence[Array] | None = None
+        self,
+        shooting: Shooting,
+        parameters: Parameters,
+        initial_states: Sequence[Array] | None = None,
+        shares: Sequence[float] = (1.0,),
     ) -> FitPoint:
         """Other parameters, or another weight of the priors; initial states moved to where they then fit best.
 
         :param initial_states: from where they are moved; by default those of this point
+        :param shares: of the way there that are tried
         """
         plant = shooting.plant.with_parameters(parameters.by_key)
-        states = shooting.settled(plant, self.initial_states if initial_states is None else initial_states)
+        states = shooting.settled(plant, self.initial_states if initial_states is None else initial_states, shares)
         point = FitPoint(shooting, parameters, *states, self.robust)
         return replace(point, directions_cost=point.cost)
 
@@ -175,9 +183,48 @@ class FitPoint:
                 if not again.cost < point.cost:
                     break
                 if point.cost - again.cost < _SETTLED * point.cost:
-                    return again
+                    return again.unstuck()
             point = again
+        return point.unstuck()
+
+    def unstuck(self) -> FitPoint:
+        """The same parameters, initial states of segments far off the others moved on in directions taken anew.
+
+        One such segment changes the sum too little for `with_new_directions`, and old directions lead it nowhere. Each
+        is tried from where it is and from where the record shows it.
+        """
+        squares = [np.mean(p.residual**2, axis=1) for p in self.projections]
+        usual = float(np.median(np.concatenate(squares)))
+        chosen = [own > _STUCK * usual for own in squares]
+        if not any(c.any() for c in chosen):
+            return self
+        far = self.subset(chosen)
+        own, anew = far._settled_on(far.initial_states), far._settled_on(far.shooting.initial_states)
+        better = [b < a for a, b in zip(own._costs(), anew._costs(), strict=True)]
+        return self.with_subset(chosen, own.with_subset(better, anew.subset(better)))
+
+    def _settled_on(self, initial_states: Sequence[Array]) -> FitPoint:
+        """From these initial states on, in directions taken anew while that gains something in any segment."""
+        point = self.settled(self.shooting, self.parameters, initial_states, _STUCK_SHARES)
+        for _ in range(_STUCK_ROUNDS):
+            before, point = point._costs(), point.settled(point.shooting, point.parameters, None, _STUCK_SHARES)
+            if all((new > (1.0 - _SETTLED) * old).all() for old, new in zip(before, point._costs(), strict=True)):
+                break
         return point
+
+    def _costs(self) -> list[Array]:
+        """(S,) per record: sum of squares of each segment from its initial states as they are."""
+        return [np.sum(p.raw**2, axis=1) for p in self.projections]
+
+    def with_subset(self, chosen: Sequence[Mask], point: FitPoint) -> FitPoint:
+        """This point with initial states and residuals of ``point``, one of its subsets at the same parameters."""
+        states, projections = list(self.initial_states), list(self.projections)
+        used = [i for i, c in enumerate(chosen) if c.any()]
+        for i, own, projection in zip(used, point.initial_states, point.projections, strict=True):
+            states[i] = states[i].copy()
+            states[i][chosen[i]] = own
+            projections[i] = projections[i].with_subset(chosen[i], projection)
+        return replace(self, initial_states=states, projections=projections)
 
     def subset(self, chosen: Sequence[Mask]) -> FitPoint:
         """On the ``chosen[i]`` (S_i,) segments of every record alone, without records of which there are none."""
@@ -273,9 +320,11 @@ def fit_segments(
             begin, settings.most_steps - steps, settings.least_gain, settings.tolerance, accepted=accepted
         )
         steps += found.iterations
-        begin = found.point.with_new_directions(1.0 - _OUTDATED_AT_END * settings.least_gain)
-        if begin is found.point or steps >= settings.most_steps:
-            return Fit(found.point, found.converged, steps)
+        end = found.point.unstuck()
+        outdated = _OUTDATED_AT_END * settings.least_gain
+        begin = end.with_new_directions(1.0 - outdated)
+        if steps >= settings.most_steps or (begin is end and end.cost > (1.0 - outdated) * found.point.cost):
+            return Fit(end, found.converged, steps)
 
 
 def evaluate(model: Model, records: Sequence[Record], settings: FitSettings | None = None) -> Fit:

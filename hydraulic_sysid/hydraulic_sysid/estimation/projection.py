@@ -69,3 +69,10 @@ class Projection:
     def subset(self, chosen: Mask) -> Projection:
         """Of the ``chosen`` (S,) segments alone."""
         return Projection(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})
+
+    def with_subset(self, chosen: Mask, other: Projection) -> Projection:
+        """These with ``other`` in the place of the ``chosen`` (S,) segments."""
+        values = {f.name: getattr(self, f.name).copy() for f in fields(self)}
+        for name, own in values.items():
+            own[chosen] = getattr(other, name)
+        return Projection(**values)

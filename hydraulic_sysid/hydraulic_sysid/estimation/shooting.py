@@ -100,19 +100,27 @@ class Shooting:
         """Eliminate the initial states around those given."""
         return self._map(lambda i: self._projection(plant, i, initial_states[i]), range(len(self.segments)))
 
-    def settled(self, plant: Plant, initial_states: Sequence[Array]) -> tuple[list[Array], list[Projection]]:
+    def settled(
+        self, plant: Plant, initial_states: Sequence[Array], shares: Sequence[float] = (1.0,)
+    ) -> tuple[list[Array], list[Projection]]:
         """Initial states where the residual is smallest, to first order, and what is left there."""
-        return self.improved(plant, initial_states, self.projections(plant, initial_states))
+        return self.improved(plant, initial_states, self.projections(plant, initial_states), shares)
 
     def improved(
-        self, plant: Plant, initial_states: Sequence[Array], before: Sequence[Projection]
+        self,
+        plant: Plant,
+        initial_states: Sequence[Array],
+        before: Sequence[Projection],
+        shares: Sequence[float] = (1.0,),
     ) -> tuple[list[Array], list[Projection]]:
         """As `settled`, from residuals and directions that are known, which hardly change with the move.
 
-        An initial state that the move makes worse stays where it was.
+        An initial state goes by that one of the ``shares`` of the way that leaves least, or stays where it was.
         """
-        moved = self.corrected(initial_states, before, [p.raw for p in before])
-        states, raw = self._better((initial_states, [p.raw for p in before]), (moved, self.residuals(plant, moved)))
+        states, raw = list(initial_states), [p.raw for p in before]
+        for share in shares:
+            moved = self.corrected(initial_states, before, [share * p.raw for p in before])
+            states, raw = self._better((states, raw), (moved, self.residuals(plant, moved)))
         return states, [p.with_raw(r) for p, r in zip(before, raw, strict=True)]
 
     def better(self, plant: Plant, one: Sequence[Array], other: Sequence[Array]) -> tuple[list[Array], list[Array]]:
