@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.ndimage import median_filter
 
 from hydraulic_sim.arrays import Array
@@ -82,15 +83,19 @@ def _spectrum(segments: Segments, residual: Array) -> _Spectrum | None:
     sign = np.sign(segments.record["drive"][index])
     way[index - begin] = sign - sign.mean()
     way /= max(float(np.sqrt(np.mean(way**2))), 1e-9)
-    frequency: Array = np.fft.rfftfreq(_FINER * len(run), segments.record.dt).astype(np.float64)
-    plain, turned = _power(run), _power(run * way[:, None])
+    count = next_fast_len(_FINER * len(run), real=True)
+    frequency: Array = np.fft.rfftfreq(count, segments.record.dt).astype(np.float64)
+    plain, turned = _power(run, np.ones_like(way), count), _power(run, way, count)
     around = np.repeat(np.asarray(median_filter(plain[::_FINER], _AROUND), dtype=float), _FINER)[: len(plain)]
     within = frequency > _SLOWEST
     floor = np.maximum(around, 1e-300)
     return _Spectrum(frequency, np.where(within, plain / floor, 0.0), np.where(within, (plain + turned) / floor, 0.0))
 
 
-def _power(run: Array) -> Array:
-    window = np.hanning(len(run))[:, None]
-    transformed = np.fft.rfft(run * window, _FINER * len(run), axis=0)
-    return np.sum(np.abs(transformed) ** 2, axis=1, dtype=np.float64)
+def _power(run: Array, factor: Array, count: int) -> Array:
+    """Of all channels (N, C) times a factor (N,), windowed, zeros up to ``count``; one by one, as records are long."""
+    weight = np.hanning(len(run)) * factor
+    power = np.zeros(count // 2 + 1)
+    for channel in run.T:
+        power += np.abs(np.fft.rfft(channel * weight, count)) ** 2
+    return power
