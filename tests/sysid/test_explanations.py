@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,8 +16,10 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
-from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose
+from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose, verdict
 from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, split
+from hydraulic_sysid.diagnosis.search.remainder import Spikes
+from hydraulic_sysid.diagnosis.search.search_state import SearchResult
 from hydraulic_sysid.report import render
 
 Array = np.ndarray
@@ -152,6 +155,19 @@ def test_spikes_are_counted_and_do_not_count(model: Model, runs) -> None:
     (spikes,) = found["recording"]["spikes"]
     assert spikes["channel"] == "pressure_a" and 27 <= spikes["count"] <= 30
     assert 0.95 < found["residual"]["after"]["validation"] < 1.05
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [
+        (1, "1 sample of pressure A (0.001 %) stands alone far off the noise, at 7 s of run; it is left out."),
+        (50, "50 samples of pressure A (0.05 %) are spikes, the first at 7 s of run; they are left out: look for a "),
+    ],
+)
+def test_few_spikes_are_an_accident(count: int, said: str) -> None:
+    found = [Spikes("pressure_a", count, 1e-5 * count, count * [("run", 7.0)])]
+    (sentence,) = verdict.recording_sentences(cast(SearchResult, SimpleNamespace(faults=[], spikes=found)))
+    assert sentence.startswith(said)
 
 
 def test_noise_on_the_recorded_drive_is_a_matter_of_the_recording(model: Model, runs) -> None:

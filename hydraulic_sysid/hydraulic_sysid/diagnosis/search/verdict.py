@@ -18,7 +18,7 @@ from .data_sheet import Deviation
 from .drive_faults import DriveHypothesis
 from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
-from .remainder import Remainder, immaterial
+from .remainder import Remainder, Spikes, immaterial
 from .search_state import SearchResult
 from .set_aside import FAR_OFF, SATURATED, SetAside
 from .whiteness import Whiteness
@@ -260,13 +260,19 @@ def _deviation(result: SearchResult, d: Deviation) -> str:
 def recording_sentences(result: SearchResult) -> list[str]:
     """What is wrong in the records, and what to mend in the logger."""
     found = [f"{fault.text}: {fault.hypothesis.remedy}." for fault in result.faults]
-    for s in result.spikes:
-        name, time = s.places[0]
-        found.append(
-            f"{s.count} samples of {TITLES[s.channel]} ({100.0 * s.share:.2g} %) are spikes, the first at {time:.4g} s "
-            f"of {name}; they are left out: look for a loose contact or a bad converter."
-        )
-    return found
+    return [*found, *map(_spikes, result.spikes)]
+
+
+def _spikes(s: Spikes) -> str:
+    """Few of them are an accident, many a fault of the recording."""
+    (name, time), one = s.places[0], s.count == 1
+    what = f"{s.count} sample{'' if one else 's'} of {TITLES[s.channel]} ({100.0 * s.share:.2g} %)"
+    where = f"{'' if one else 'the first '}at {time:.4g} s of {name}"
+    out = "it is left out" if one else "they are left out"
+    if s.share > MANY_SPIKES:
+        what += " is a spike" if one else " are spikes"
+        return f"{what}, {where}; {out}: look for a loose contact or a bad converter."
+    return f"{what} stand{'s' if one else ''} alone far off the noise, {where}; {out}."
 
 
 def set_aside_sentences(found: Sequence[SetAside]) -> list[str]:
