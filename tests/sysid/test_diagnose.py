@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -93,6 +94,15 @@ def test_lines_are_tried_where_a_shape_is_a_frequency(model) -> None:
     tried = {p.values["pump_ripple.frequency"] for g in probes(ripple, RecordFeatures(lines=(33.0,))) for p in g}
     assert 33.0 in tried
     assert 33.0 not in {p.values["pump_ripple.frequency"] for g in probes(ripple, RecordFeatures()) for p in g}
+
+
+@pytest.mark.parametrize("stroke", [0.1, 0.6, math.inf])
+def test_lengths_are_tried_within_the_stroke(model, stroke: float) -> None:
+    """Cushions that meet in the middle differ in nothing but their strength: from there no fit finds shorter ones."""
+    key = "end_cushion.length"
+    lengths = [g[0].values[key] for g in probes(model.library["end_cushion"], RecordFeatures(stroke=stroke))]
+    assert max(lengths) < 0.5 * stroke
+    assert len(set(lengths)) >= 2
 
 
 @pytest.mark.parametrize("line", [7.0, 32.414, 180.3])

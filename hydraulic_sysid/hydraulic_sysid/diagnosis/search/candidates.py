@@ -21,6 +21,7 @@ SIZES = (1.0, 0.25)  # of the default, measured from the null value
 LARGE = (10.0,)  # where those change nothing
 MOST_SHAPES = 7
 ANGLE = "rad"
+WITHIN = 0.4  # of the stroke: lengths that are tried are no longer
 QUARTERS = tuple(0.5 * math.pi * i for i in range(4))  # angles that are tried
 
 
@@ -57,13 +58,15 @@ def subsystem(effect: Effect) -> str:
 
 @dataclass(frozen=True)
 class RecordFeatures:
-    """What records show by themselves: spectral ``lines`` [Hz] of a residual, the position's ``resolution`` [m].
+    """What is known by itself: spectral ``lines`` [Hz] of a residual, the position's ``resolution`` and ``stroke`` [m].
 
     Frequencies are tried at the lines too; a parameter that is ``observed`` is tried at what was seen, and stays.
+    Lengths are tried within the stroke: beyond, a law may not change with them.
     """
 
     lines: tuple[float, ...] = ()
     resolution: float = 0.0
+    stroke: float = math.inf
 
 
 def observed(effect: Effect) -> bool:
@@ -88,16 +91,15 @@ def probes(effect: Effect, features: RecordFeatures, sizes: Sequence[float] = SI
                 key = f"{effect.name}.{p.name}"
                 yield [Probe({key: features.resolution}, key, p.null)]
         return
-    lines = features.lines
     shape = [p for p in effect.parameters if p.null is None and p.unit != ANGLE]
     angles = [p for p in effect.parameters if p.null is None and p.unit == ANGLE]
     moved = [p for p in effect.parameters if p.null is not None and p.free]
-    grids = [_grid(p, lines) for p in shape]
+    grids = [_grid(p, features) for p in shape]
     first = tuple(g[0] for g in grids)
     tried = [first] + [c for c in itertools.product(*grids) if c != first and _changes(c, first) == 1]
     # An angle says nothing without the right frequency, nor the other way round: all of one with all of the other.
     for values, turned in itertools.product(
-        tried[: MOST_SHAPES + len(lines)], itertools.product(QUARTERS, repeat=len(angles))
+        tried[: MOST_SHAPES + len(features.lines)], itertools.product(QUARTERS, repeat=len(angles))
     ):
         given = {f"{effect.name}.{p.name}": v for p, v in zip([*shape, *angles], [*values, *turned], strict=True)}
         for size in sizes if values == first else sizes[:1]:
@@ -120,13 +122,15 @@ def _changes(one: tuple[float, ...], other: tuple[float, ...]) -> int:
     return sum(a != b for a, b in zip(one, other, strict=True))
 
 
-def _grid(p: Parameter, lines: tuple[float, ...]) -> list[float]:
+def _grid(p: Parameter, features: RecordFeatures) -> list[float]:
     low, high = p.bounds
     if not p.free:
         return [p.default]
     values = [p.default * f for f in SHAPES]
+    if p.unit == "m":
+        values = list(dict.fromkeys(min(v, WITHIN * features.stroke) for v in values))
     if p.unit == "Hz":
-        values += list(lines)
+        values += list(features.lines)
     return [v for v in values if low <= v <= high] or [p.default]
 
 

@@ -59,16 +59,16 @@ def _score(at: Linearisation, effect: Effect, features: RecordFeatures) -> Candi
 
 
 def _best(found: Sequence[CandidateScore]) -> CandidateScore:
-    """The best of one effect's; if not from there, from its probe, or from the next of another shape."""
-    best = max(found, key=lambda f: f.reduction)
+    """The best of one effect's; if not from there, from its probe, or from the best of each other shape."""
+    best, *rest = sorted(found, key=lambda f: -f.reduction)
     shape = [f"{best.effect.name}.{p.name}" for p in best.effect.parameters if p.null is None]
-    next_best = max(
-        (f for f in found if any(f.start[key] != best.start[key] for key in shape)),
-        key=lambda f: f.reduction,
-        default=best,
-    )
-    more = (next_best.start,) if next_best is not best and next_best.reduction > AS_WELL * best.reduction else ()
-    return replace(best, others=(*best.others, *more))
+    seen, more = {tuple(best.start[key] for key in shape)}, list(best.others)
+    for one in rest:
+        own = tuple(one.start[key] for key in shape)
+        if own not in seen and one.reduction > AS_WELL * best.reduction:
+            seen.add(own)
+            more.append(one.start)
+    return replace(best, others=tuple(more))
 
 
 def _predict(at: Linearisation, plant: Plant, effect: Effect, group: list[Probe]) -> CandidateScore | None:

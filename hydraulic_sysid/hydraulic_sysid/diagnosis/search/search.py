@@ -416,7 +416,7 @@ class Search:
         for number, s in enumerate(best):
             found = self.refit(base, s)
             for start in s.others if number < FULL else ():
-                if base.misfit.fit - found.misfit.fit < NEAR * s.reduction:
+                if found.misfit.excess > (1.0 - NEAR) * base.misfit.excess:
                     again = self.refit(base, replace(s, start=start))
                     found = min(found, again, key=lambda r: r.misfit.total)
             every.append(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -26,12 +27,13 @@ _SLOWEST = 2.0  # Hz, slower is drift within a segment
 
 
 def record_features(at: Linearisation) -> RecordFeatures:
-    """Lines, and the step between position readings that all records share (0 where they have none)."""
+    """Lines, the step between position readings that all records share (0 where they have none), and the stroke."""
     steps = [code_step(s.record["position"]) for s in at.split.segments]
     shared = float(np.median(steps)) if max(steps) < 1.01 * min(steps) else 0.0
     if any(_converted(s) for s in at.split.segments):
         shared = 0.0
-    return RecordFeatures(spectral_lines(at.split.segments, at.residual), shared)
+    stroke = at.model.value("stroke") if at.model.kind == "hydraulic" else math.inf
+    return RecordFeatures(spectral_lines(at.split.segments, at.residual), shared, stroke)
 
 
 def _converted(segments: Segments) -> bool:
