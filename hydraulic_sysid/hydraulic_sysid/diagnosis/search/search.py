@@ -345,7 +345,12 @@ class Search:
                     faults=tuple(together(found.faults, alone.fault)),
                     as_recorded=found.as_recorded or found.base.misfit,
                 )  # fmt: skip
-            tied = self.as_good(found, model, fault) if found.moved else alone
+            # Beside a fault, other numbers may be wrong than beside the effect.
+            tied = (
+                self.as_good(found, model, fault) or self.as_good(found, relaxed(model), fault)
+                if found.moved
+                else alone
+            )
             same += [tied.fault] if tied is not None else []
         return replace(found, faults_instead=tuple(same))
 
