@@ -27,7 +27,8 @@ from .shooting import Shooting
 
 _SETTLED = 1e-4  # share of a cost below which moving initial states on gains no more
 _ROUNDS = 4  # times that they are moved at most
-_STUCK = 2.0  # times the median mean square of the segments, from which initial states may be stuck; …
+_NEAR = 2.0  # median mean square over noise of the segments, up to which …
+_STUCK = 5.0  # … those that lie so many standard deviations of a mean square above it may be stuck; …
 _STUCK_ROUNDS = 10  # … times that they are moved at most, …
 _STUCK_SHARES = (1.0, 0.3, 0.1)  # … by which of the way that the directions show
 _NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured pressures go further
@@ -191,11 +192,17 @@ class FitPoint:
         """The same parameters, initial states of segments far off the others moved on in directions taken anew.
 
         One such segment changes the sum too little for `with_new_directions`, and old directions lead it nowhere. Each
-        is tried from where it is and from where the record shows it.
+        is tried from where it is and from where the record shows it. Of a model that is far off this says nothing: it
+        leaves every segment an error of its own.
         """
         squares = [np.mean(p.residual**2, axis=1) for p in self.projections]
         usual = float(np.median(np.concatenate(squares)))
-        chosen = [own > _STUCK * usual for own in squares]
+        if usual > _NEAR:
+            return self
+        chosen = [
+            own > usual * (1.0 + _STUCK * np.sqrt(2.0 / p.raw.shape[1]))
+            for own, p in zip(squares, self.projections, strict=True)
+        ]
         if not any(c.any() for c in chosen):
             return self
         far = self.subset(chosen)
