@@ -184,7 +184,8 @@ class FitPoint:
                 if not again.cost < point.cost:
                     break
                 if point.cost - again.cost < _SETTLED * point.cost:
-                    return again.unstuck()
+                    point = again
+                    break
             point = again
         return point.unstuck()
 
