@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -96,7 +95,7 @@ def test_lines_are_tried_where_a_shape_is_a_frequency(model) -> None:
     assert 33.0 not in {p.values["pump_ripple.frequency"] for g in probes(ripple, RecordFeatures()) for p in g}
 
 
-@pytest.mark.parametrize("stroke", [0.1, 0.6, math.inf])
+@pytest.mark.parametrize("stroke", [0.1, 0.6, 1.5])
 def test_lengths_are_tried_within_the_stroke(model, stroke: float) -> None:
     """Cushions that meet in the middle differ in nothing but their strength: from there no fit finds shorter ones."""
     key = "end_cushion.length"
