@@ -18,7 +18,8 @@ from hydraulic_sim.model import Model
 
 SHAPES = (1.0, 0.3, 3.0, 8.0)  # of the default
 SIZES = (1.0, 0.25)  # of the default, measured from the null value
-LARGE = (10.0,)  # where those change nothing
+LARGE = (10.0,)  # where those change nothing, …
+SMALL = (0.1, 0.02)  # … and where the plant is too small for them
 MOST_SHAPES = 7
 ANGLE = "rad"
 WITHIN = 0.4  # of the stroke: lengths that are tried are no longer

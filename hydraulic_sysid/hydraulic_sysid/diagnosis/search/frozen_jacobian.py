@@ -68,10 +68,10 @@ def refit_rounded(at: Linearisation, model: Model) -> Refit:
 
 def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Sequence[str]) -> FrozenPoint | None:
     """Where to start: as far towards the prediction as lowers the sum of squares."""
-    plant = Plant.for_fits(model).with_parameters(dict(start))
     predicted = Parameters.of(model, own)
     values = np.array([start[k] for k in own])
     predicted = replace(predicted, values=np.clip(values, predicted.low, predicted.high))
+    plant = Plant.for_fits(model.with_values({**start, **predicted.by_key}))
     records = [model.parameter(k) for k in own]
     before = sum(float(c[f].sum()) for c, f in zip(at.costs, at.split.fit, strict=True)) + at.parameters.prior_cost
     found = None

@@ -15,11 +15,12 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.levenberg_marquardt import bounded_step
 from hydraulic_sysid.estimation.parameters import Parameters
 
-from .candidates import LARGE, SIZES, Probe, RecordFeatures, between, inverse, observed, probes
+from .candidates import LARGE, SIZES, SMALL, Probe, RecordFeatures, between, inverse, observed, probes
 from .linearisation import Linearisation
 
 ENOUGH = 50  # segments that do for a look, spread over all records
@@ -49,9 +50,9 @@ def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures
 
 
 def _score(at: Linearisation, effect: Effect, features: RecordFeatures) -> CandidateScore | None:
-    plant = Plant.for_fits(at.model.with_effect(effect.name))
-    for sizes in (SIZES, LARGE):
-        found = [_predict(at, plant, effect, group) for group in probes(effect, features, sizes)]
+    model = at.model.with_effect(effect.name)
+    for sizes in (SIZES, LARGE, SMALL):
+        found = [_predict(at, model, effect, group) for group in probes(effect, features, sizes)]
         usable = [f for f in found if f is not None]
         if usable:
             return _best(usable)
@@ -71,9 +72,10 @@ def _best(found: Sequence[CandidateScore]) -> CandidateScore:
     return replace(best, others=tuple(more))
 
 
-def _predict(at: Linearisation, plant: Plant, effect: Effect, group: list[Probe]) -> CandidateScore | None:
+def _predict(at: Linearisation, model: Model, effect: Effect, group: list[Probe]) -> CandidateScore | None:
     try:
-        columns = at.changes([plant.with_parameters({**at.parameters.by_key, **p.values}) for p in group])
+        # Each with the steps that its own values ask for: the effect's defaults may be those of a larger plant.
+        columns = at.changes([Plant.for_fits(model.with_values(p.values)) for p in group])
     except SimulationError:
         return None
     start = dict(group[0].values)

@@ -597,6 +597,11 @@ class Search:
                 continue
             without = self.explore(without, most=LATER_REFITS)
             competing = {**competing, name: without}
+            # Added last, it may lead on from where the fit had stopped.
+            own = [r for r in without.refits if r.name == name and r.misfit.total < state.misfit.total]
+            again = self.finish(replace(without, refits=own), anything)
+            if again is not None and again.misfit.total < state.misfit.total:
+                state = again
             near = near_competitors(base, without, state, name)
             other = self.finish(near, anything) if swaps < MOST_SWAPS else None
             if other is not None and state.misfit.total - other.misfit.total > state.misfit.least:
