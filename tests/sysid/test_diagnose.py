@@ -367,6 +367,7 @@ def test_half_the_influence_of_a_frequency_is_twice_the_frequency() -> None:
     assert between(1000.0, 80.0, 0.5, 80.0) == 160.0
     assert between(0.0, 0.04, 0.5, 0.02) == 0.02
     assert between(1.0, 1.04, 0.5, 1.03) == pytest.approx(1.02)
+    assert between(1.0, 0.2, 1.0, 1.03) == 0.2, "a bound stays within the bounds"
 
 
 def test_a_reduction_must_show_on_segments_for_fitting_and_for_validation() -> None:

@@ -121,6 +121,18 @@ def test_areas_that_say_the_same_are_both_named(model: Model) -> None:
     assert other["standard_error"] < 0.02 * other["nominal"] and f", or {other['key']} is" in found["verdict"]["text"]
 
 
+def test_wrong_numbers_beside_a_missing_effect_are_named_as_such(model: Model) -> None:
+    """The effect hides at first what they do, so that the data sheet is asked again once it is there."""
+    off = {"piston_area_b": 0.97, "supply_pressure": 1.03}
+    truth = {key: share * model.value(key) for key, share in off.items()}
+    bench = model.with_effect("command_delay", {"delay": 0.02}).with_values(truth)
+    found = document(diagnose(model, records(driven(bench))))
+    assert found["verdict"]["kind"] == "missing", found["verdict"]["text"]
+    assert [e["name"] for e in found["effects"] if e["added"]] == ["command_delay"]
+    assert {d["key"] for d in found["data_sheet"]} == set(truth)
+    assert found["residual"]["after"]["validation"] < 1.05
+
+
 def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> None:
     late = [{c: np.concatenate((v[:1], v[:1], v[:-2])) if c.startswith("pressure") else v for c, v in run.items()}
             for run in runs]  # fmt: skip

@@ -116,7 +116,7 @@ def between(null: float, value: float, share: float, default: float) -> float:
     """The value that acts ``share`` times as much as ``value`` [SI], counted from the null value."""
     if inverse(null, default):
         return min(value / share, null) if share > 0.0 else null
-    return null + share * (value - null)
+    return (1.0 - share) * null + share * value  # exactly the value at 1: it may be a bound
 
 
 def _changes(one: tuple[float, ...], other: tuple[float, ...]) -> int:

@@ -160,19 +160,29 @@ class FrozenPoint:
         return self._from(self.parameters.moved(change), ahead)
 
     def at_rest(self, rounds: int) -> FrozenPoint:
-        """The same parameters, every segment from the best of a few initial states."""
-        point = self
+        """The same parameters, every segment from the best of a few initial states.
+
+        Those that a model without the candidate was fitted with may be bent to where no first-order step leads out: in
+        the end each segment is begun from where the record shows it, too.
+        """
+        point, at = self, self.linearisation
         for _ in range(rounds):
-            again = point._from(point.parameters, point.raw)
-            if again is None:
-                break
-            better = [(new < old)[:, None] for new, old in zip(again.costs, point.costs, strict=True)]
-            point = replace(
-                point,
-                initial_states=_chosen(better, again.initial_states, point.initial_states),
-                raw=_chosen(better, again.raw, point.raw),
-            )
+            point = point._better_of(point._from(point.parameters, point.raw))
+        anew = FrozenPoint.at(at, self.plant, self.parameters, at.point.shooting.initial_states)
+        if anew is not None:
+            point = point._better_of(anew)._better_of(anew._from(anew.parameters, anew.raw))
         return point
+
+    def _better_of(self, other: FrozenPoint | None) -> FrozenPoint:
+        """Every segment from that one's initial states where they leave less."""
+        if other is None:
+            return self
+        better = [(new < old)[:, None] for new, old in zip(other.costs, self.costs, strict=True)]
+        return replace(
+            self,
+            initial_states=_chosen(better, other.initial_states, self.initial_states),
+            raw=_chosen(better, other.raw, self.raw),
+        )
 
     def _from(self, parameters: Parameters, residuals: Sequence[Array]) -> FrozenPoint | None:
         """From the initial states that these residuals ask for."""

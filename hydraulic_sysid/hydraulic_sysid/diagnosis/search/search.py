@@ -152,9 +152,14 @@ class Search:
         return self.loosened(strict)
 
     def loosened(self, strict: SearchState) -> SearchState:
+        """A state with the data sheet relaxed, where that helps, judged by the noise that it shows."""
+        loose = self.loose(strict)
+        return strict if loose is None else self.judged(loose)
+
+    def loose(self, strict: SearchState) -> SearchState | None:
         """A state with the data sheet relaxed, where that helps."""
         if strict.misfit.variance < LOOSE or not self._strict(strict):
-            return strict
+            return None
         self.say("fitting the model within the tolerances of its data sheet")
         at_bound = strict.linearisation.parameters.at_bound
         # What lies at its bound may be far beyond it.
@@ -162,10 +167,9 @@ class Search:
         try:
             loose = self.nearer(relaxed(strict.model), far)
         except SimulationError:  # it went where the plant does not run
-            return strict
-        if material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER:
-            return self.judged(loose)
-        return strict
+            return None
+        helps = material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER
+        return loose if helps else None
 
     def nearer(self, model: Model, far: bool) -> SearchState:
         """A model fitted: where it is ``far`` off, to the end only if it comes near.
@@ -398,7 +402,10 @@ class Search:
 
     def _strict(self, base: SearchState) -> bool:
         """Whether the data sheet is as it was given."""
-        return base.linearisation.parameters.keys == self.given.movable_keys()
+        at, given = base.model.entry, self.given.entry
+        return all(
+            (at(k).free, at(k).bounds) == (given(k).free, given(k).bounds) for k in self.given.keys() if "." not in k  # noqa: SIM118
+        )  # fmt: skip
 
     def _smooth(self, model: Model) -> Model:
         """Without effects that have no derivative."""
@@ -507,10 +514,15 @@ class Search:
             self.split = before
             return found
         self.say("searching on: what was taken for noise or small delays was partly what is missing")
-        base, tried = self.state(found.base.model, self._last), [r.name for r in found.base.refits[:LATER_REFITS]]
-        refits = [self.refit(base, s) for s in found.base.scores if s.effect.name in tried]
-        base = replace(base, refits=sorted(refits, key=lambda r: r.misfit.total), scores=found.base.scores)
-        return self.forward(base, self.state(found.final.model, self._last))
+        return self.onward(found.base, found.base.model, self.state(found.final.model, self._last))
+
+    def onward(self, base: SearchState, model: Model, known: SearchState) -> SearchResult:
+        """The search from what is ``known`` on, its ``base`` and what was tried there fitted anew to ``model``."""
+        tried = [r.name for r in base.refits[:LATER_REFITS]]
+        again = self.state(model, self._last)
+        refits = [self.refit(again, s) for s in base.scores if s.effect.name in tried]
+        again = replace(again, refits=sorted(refits, key=lambda r: r.misfit.total), scores=base.scores)
+        return self.forward(again, known)
 
     def forward(self, base: SearchState, known: SearchState | None = None) -> SearchResult:
         """Forward from the base or from what is ``known``, backward, and every effect added against its competitors."""
@@ -529,6 +541,14 @@ class Search:
                 if not material(plain.misfit, better.misfit):
                     base = replace(plain, refits=base.refits, scores=base.scores)
                     path, better = [base], None
+            # What is left beside an effect may be wrong numbers, which another effect would only imitate.
+            doubtful = bool(added) and (better is None or better.misfit.variance >= LOOSE)
+            loose = self.loose(path[-1]) if doubtful else None
+            if loose is not None and (better is None or loose.misfit.total < better.misfit.total):
+                loose, model = self.judged(loose), loose.model
+                for name in added:
+                    model = model.without_effect(name)
+                return self.onward(base, model, loose)
             if better is None:
                 break
             added.append(_new(better, path[-1]))
