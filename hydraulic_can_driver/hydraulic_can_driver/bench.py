@@ -286,6 +286,8 @@ class Bench:
         self._reset_what_was_left()
         states = self.receiver.states
         operational = all(states.get(node.name) == OPERATIONAL for node in self.bus.nodes.values() if node.heartbeat)
+        if not operational:
+            self.frames.forget()  # who is not operational does not answer
         answered = operational and not self.frames.lacking()
         return answered and self.machine.arrived and self.machine.goal is State.DISABLED
 

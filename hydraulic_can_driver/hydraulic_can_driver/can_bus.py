@@ -64,6 +64,11 @@ def programs_only(interface: str, channel: str) -> bool:
     return interface in PROGRAMS_ONLY
 
 
+def stamps_by_wall_clock(interface: str) -> bool:
+    """Whether each frame says when it was received, by this machine's clock and not by that of an adapter."""
+    return interface in ("socketcan", *PROGRAMS_ONLY)
+
+
 def hears_itself(interface: str) -> bool:
     """Whether frames that are sent come back to their sender."""
     return interface == "udp_multicast"

@@ -2,9 +2,11 @@
 
 `begin`, `wait` and `end` are called around a cycle; `take` by the thread that receives, for every frame as it comes.
 
-A frame does not say which SYNC it answers. One that comes while none is missing makes up for one that was missing
-before. A device that misses several cycles in a row and does not make up for them is taken to be late: each of its
-frames may be one of an earlier SYNC.
+A frame does not say which SYNC it answers: the counter of CiA 301 (0x1019) numbers the SYNC, and no process data give
+it back. So it is told by two things. What the interface received before a SYNC was sent does not answer that SYNC,
+however late this program looks at it. And a device answers each SYNC once, in their order: as long as it owes answers,
+the next frame is that to the oldest SYNC, and a cycle is complete only when all debts are paid as well. Where few are
+owed and the device has sent one frame per SYNC for a while, those were lost for good and are forgotten.
 """
 
 from __future__ import annotations
@@ -18,14 +20,13 @@ from hydraulic_can_driver.codec import PdoCodec
 from hydraulic_can_driver.errors import CodecError
 from hydraulic_can_driver.faults import BusFault, FaultLatch
 
-_LOST = 2  # so many frames in a row may be lost for good
+_LOST = 2  # so many frames may be lost for good ...
+_STEADY = 2  # ... which they are after so many cycles in a row with one frame each
+_ROUNDING_NS = 1000  # of an instant that python-can gives in seconds
 
 
 class Frames:
-    """Frames of all devices by COB-ID; `owed[cob_id]` are those that a device has not made up for.
-
-    `behind` counts the complete cycles since a device has owed more than may be lost.
-    """
+    """Frames of all devices by COB-ID; `owed[cob_id]` are the answers to earlier SYNCs that have not come."""
 
     def __init__(self, bus: Bus, faults: FaultLatch) -> None:
         self._codecs = {pdo.cob_id: PdoCodec(pdo) for node in bus.nodes.values() for pdo in node.transmit}
@@ -33,16 +34,18 @@ class Frames:
         self._faults = faults
         self._changed = threading.Condition(threading.Lock())
         self._raw: dict[int, bytes] = {}
+        self._came: dict[int, int] = {}  # frames since the SYNC
         self._missing: set[int] = set(self._codecs)
         self._lacked = self._missing
         self._open = False
+        self._counted = True  # what this cycle lacks stands in `owed`
+        self._sent_ns = 0  # wall time before which nothing that answers this SYNC was received
         self.cycle = 0
         self.sync_ns = 0  # wall time
         self.instant_ns = 0  # the same instant on the monotonic clock
         self.late = 0
         self.owed: dict[int, int] = {}
-        self.behind = 0
-        self._run: dict[int, tuple[int, int]] = {}  # cycles missed in a row, owed before them
+        self._steady: dict[int, int] = {}  # cycles in a row with one frame each
 
     @property
     def cob_ids(self) -> Iterable[int]:
@@ -52,11 +55,14 @@ class Frames:
     def begin(self, stamp_ns: int) -> None:
         """A SYNC was sent or heard at `stamp_ns` (wall time): from here on frames belong to it."""
         with self._changed:
-            self._missing = set(self._codecs)
-            self._open = True
+            self._count()
+            self._missing, self._came = set(self._codecs), {}
+            self._open, self._counted = True, False
             self.cycle += 1
             self.sync_ns = stamp_ns
-            self.instant_ns = stamp_ns - time.time_ns() + time.monotonic_ns()
+            now = time.time_ns()
+            self._sent_ns = min(stamp_ns, now) - _ROUNDING_NS  # the stamps of a lockstep may be ahead
+            self.instant_ns = stamp_ns - now + time.monotonic_ns()
             self._changed.notify_all()
 
     def end(self) -> None:
@@ -64,23 +70,10 @@ class Frames:
         with self._changed:
             self._open = False
             self._lacked = set(self._missing)
-            for cob_id in self._codecs:
-                owed = self.owed.get(cob_id, 0)
-                run, before = self._run.get(cob_id, (0, owed))
-                if cob_id in self._missing:
-                    self._run[cob_id] = run + 1, before
-                    self.owed[cob_id] = owed + 1
-                else:
-                    self._run.pop(cob_id, None)
-                    if run <= _LOST and owed > before:
-                        self._pay(cob_id, owed - before)
-            if max(self.owed.values(), default=0) <= _LOST:
-                self.behind = 0
-            elif not self._missing:
-                self.behind += 1
+            self._count()
 
-    def take(self, cob_id: int, data: bytes) -> None:
-        """A frame has come."""
+    def take(self, cob_id: int, data: bytes, received_ns: int = 0) -> None:
+        """A frame has come, which the interface received at `received_ns` (wall time); 0 where it does not say."""
         codec = self._codecs[cob_id]
         if len(data) != codec.pdo.length:
             try:
@@ -89,29 +82,43 @@ class Frames:
                 self._faults.report(BusFault.LENGTH, f"{self._nodes[cob_id].name}: {error}")
             return
         with self._changed:
-            # A second one within a cycle means that the first belonged to the cycle before.
-            if not self._open or cob_id not in self._missing:
-                self.late += 1
-                self._pay(cob_id, 1)
             self._raw[cob_id] = data
-            self._missing.discard(cob_id)
-            if not self._missing:
-                self._changed.notify_all()
+            owed = self.owed.get(cob_id, 0)
+            before = 0 < received_ns < self._sent_ns
+            if self._open and not before:
+                self._came[cob_id] = self._came.get(cob_id, 0) + 1
+                if not owed and cob_id in self._missing:
+                    self._missing.discard(cob_id)
+                    if not self._missing:
+                        self._changed.notify_all()
+                    return
+            self.late += 1
+            self._owe(cob_id, owed - 1)
 
     def forget(self) -> None:
         """Nobody owes anything."""
         with self._changed:
-            self.owed, self._run, self.behind = {}, {}, 0
+            self.owed, self._steady = {}, {}
 
     def debtors(self) -> list[str]:
         """Devices whose frames may be those of earlier SYNCs, with the number of cycles."""
         with self._changed:
             return [f"{self._nodes[cob_id].name} by {count} cycles" for cob_id, count in self.owed.items()]
 
-    def _pay(self, cob_id: int, count: int) -> None:
-        left = self.owed.pop(cob_id, 0) - count
-        if left > 0:
-            self.owed[cob_id] = left
+    def _count(self) -> None:
+        """Who owes what after this cycle, once."""
+        if self._counted:
+            return
+        self._counted = True
+        for cob_id in self._codecs:
+            owed = self.owed.get(cob_id, 0) + (cob_id in self._missing)
+            self._steady[cob_id] = self._steady.get(cob_id, 0) + 1 if self._came.get(cob_id) == 1 else 0
+            self._owe(cob_id, 0 if owed <= _LOST and self._steady[cob_id] >= _STEADY else owed)
+
+    def _owe(self, cob_id: int, count: int) -> None:
+        self.owed.pop(cob_id, None)
+        if count > 0:
+            self.owed[cob_id] = count
 
     def wait_sync(self, after_ns: int, until_ns: int) -> bool:
         """Wait for a SYNC later than `after_ns`, at the longest until `until_ns`; both of `time.monotonic_ns`."""
@@ -125,9 +132,9 @@ class Frames:
             return self._changed.wait_for(lambda: not self._missing, max(until - time.monotonic(), 0.0))
 
     def has(self, cob_id: int) -> bool:
-        """Whether a frame has come in this cycle."""
+        """Whether a frame has come in this cycle, be it that of an earlier one."""
         with self._changed:
-            return self.cycle > 0 and cob_id not in self._missing
+            return cob_id in self._came
 
     def lacking(self) -> list[str]:
         """Names of the devices whose frames were missing when the cycle ended; a frame may have come since."""

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import can
 
 from hydraulic_can_driver.bus import Bus, Node
-from hydraulic_can_driver.can_bus import hears_itself
+from hydraulic_can_driver.can_bus import hears_itself, stamps_by_wall_clock
 from hydraulic_can_driver.faults import BusFault, FaultLatch
 from hydraulic_can_driver.frames import Frames
 from hydraulic_plant_node.pacing import request_realtime
@@ -57,11 +57,13 @@ class Receiver(can.Listener):
         self.unexpected = 0
         self.priority = 0
         self._echo = hears_itself(interface)
+        self._dated = stamps_by_wall_clock(interface)
+        self._received = 0  # when the frame at hand was, by the interface, ns; 0: it does not say
         self._outstanding: dict[int, deque[float]] = {}
         self._handlers: dict[int, Callable[[bytes], None]] = {}
         self._known: set[int] = set()
         for cob_id in frames.cob_ids:
-            self._handlers[cob_id] = lambda data, cob_id=cob_id: frames.take(cob_id, data)  # type: ignore[misc]
+            self._handlers[cob_id] = lambda data, cob_id=cob_id: frames.take(cob_id, data, self._received)  # type: ignore[misc]
         for node in bus.nodes.values():
             self._handlers[HEARTBEAT + node.id] = lambda data, node=node: self._heartbeat(node, data)  # type: ignore[misc]
             self._handlers[EMERGENCY + node.id] = lambda data, node=node: self._emergency(node, data)  # type: ignore[misc]
@@ -91,6 +93,7 @@ class Receiver(can.Listener):
         if self._kernel_sync and cob_id == SYNC:
             self._kernel(round(msg.timestamp * 1e9))
         elif cob_id in self._handlers:
+            self._received = round(msg.timestamp * 1e9) if self._dated else 0
             self._handlers[cob_id](bytes(msg.data))
         elif cob_id not in self._known:
             self.unexpected += 1

@@ -72,15 +72,12 @@ class Supervision:
         self._worst_ns = max(self._worst_ns, deviation)
         if deviation > LATE * 1e9 / self._bus.rate:
             self.late += 1
-        patience = self._bus.monitoring.missed_cycles
         if complete:
             self._missed_in_a_row = 0
-            if self._frames.behind >= patience:
-                self._faults.report(BusFault.FRAMES, f"frames come late: {', '.join(self._frames.debtors())}")
             return
         self.missed += 1
         self._missed_in_a_row += 1
-        if self._missed_in_a_row >= patience:
+        if self._missed_in_a_row >= self._bus.monitoring.missed_cycles:
             who = ", ".join(self._frames.lacking()) or "the SYNC"
             self._faults.report(BusFault.FRAMES, f"no frames in time in {self._missed_in_a_row} cycles in a row: {who}")
 
