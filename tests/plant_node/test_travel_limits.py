@@ -45,10 +45,25 @@ def test_towards_an_end_the_piston_can_still_be_stopped(side: float) -> None:
     assert limits_at(side * 5.0).allowed() == limits_at(side * 0.762).allowed(), "beyond the end"
 
 
+def test_before_an_end_a_drive_grows_slowly_whichever_way_it_goes() -> None:
+    limits = limits_at(0.7)
+    allowed = limits.allowed()
+    assert allowed < DRIVE_LIMIT_V
+    for drive in (10.0, -10.0):
+        grown = []
+        for _ in range(65):
+            limits.observe(0.7)
+            grown.append(abs(limits.limited(drive)))
+        assert grown[0] == pytest.approx(allowed * PERIOD / 0.06)
+        assert grown[9] == pytest.approx(10.0 * grown[0]), "by a straight line"
+        assert grown[-1] == allowed
+        assert limits.limited(0.0) == 0.0, "0 V at once"
+
+
 def test_without_a_position_the_piston_may_be_anywhere() -> None:
     limits = TravelLimits(ENDS, PERIOD)
     creep = limits.allowed()
-    assert limits.limited(10.0) == creep < 1.0
+    assert [limits.limited(10.0) for _ in range(100)][-1] == creep < 1.0
     limits.observe(0.0)
     drives = [limits.limited(10.0) for _ in range(2000)]
     assert max(drives) == 10.0 and drives[-1] == creep

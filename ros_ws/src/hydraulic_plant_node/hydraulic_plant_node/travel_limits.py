@@ -6,7 +6,8 @@ At the distance d from the nearer end the piston may move at most as fast as it 
 
 a: deceleration, t: reaction time. The drive is limited to v(d) over the speed per volt, in both directions: leaving an
 end as slowly as approaching it is what keeps oil and load from swinging back into it. The slew limit holds for a drive
-that grows; towards 0 V a drive may always jump.
+that grows; towards 0 V a drive may always jump. Where braking limits it, a drive takes at least 60 ms to grow to that
+limit: what alternates as fast as the load swings on the oil then hardly pumps it, even where nothing damps it.
 
 What is applied lies between 0 V and what was commanded. Where a position is missing, the piston may have moved at full
 speed ever since the last one.
@@ -20,6 +21,7 @@ from dataclasses import dataclass
 from hydraulic_interfaces.contract import DRIVE_LIMIT_V
 
 _CREEP = 0.4  # of the impact speed: the rest is for the swing of the load on the oil
+_GROWTH_S = 0.06  # of a drive from 0 to what braking allows; the load swings at 20 to 80 Hz
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,10 @@ class TravelLimits:
         if size > allowed:
             size = allowed
             self.braked += 1
-        grown = self._step + (abs(self._last) if self._last * drive > 0.0 else 0.0)
+        step = self._step
+        if allowed < DRIVE_LIMIT_V:
+            step = min(step, allowed * self._period / _GROWTH_S)
+        grown = step + (abs(self._last) if self._last * drive > 0.0 else 0.0)
         if size > grown:
             size = grown
             self.slewed += 1
