@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from typing import Any
@@ -17,7 +18,8 @@ PROCESS = """
 import rclpy
 from std_msgs.msg import String
 rclpy.init()
-rclpy.create_node("profiled").create_publisher(String, "said", 1).publish(String(data="well"))
+node = rclpy.create_node("profiled")
+node.create_publisher(String, "said", 1).publish(String(data="well"))
 """
 
 
@@ -35,6 +37,18 @@ def test_fast_dds_reads_its_profile_without_a_complaint(ros_domain: int, tmp_pat
         '<dds><profiles><data_writer profile_name="bad"><times><beat/></times></data_writer></profiles></dds>'
     )
     assert "XMLPARSER" in complaints(str(tmp_path / "bad.xml")), "one that is not understood would be complained of"
+
+
+def test_nobody_is_listened_to_in_shared_memory(ros_domain: int) -> None:
+    """The middleware's threads are named after the port that they listen to."""
+    ask = """
+from pathlib import Path
+for file in Path("/proc/self/task").glob("*/comm"):
+    print(file.read_text().strip())
+"""
+    done = subprocess.run([sys.executable, "-c", PROCESS + ask], capture_output=True, text=True, check=True)
+    listening = {name.rpartition(".")[0] for name in done.stdout.split() if re.fullmatch(r"dds\.\w+\.\d{4,}", name)}
+    assert listening == {"dds.udp"}
 
 
 LOCAL = middleware.VARIABLES[middleware.PROFILES[0]]

@@ -22,7 +22,7 @@ def set_up() -> None:
     discovery alone leaves the sockets open to whoever knows the address, so the profile has them listen on the loopback
     interface. A user who sets a wider range wants a network, and gets the profile for it; one who sets a profile keeps
     it. Fast DDS asks its subscribers only every 3 s what they lack and have got, which a stream or a process that
-    leaves would wait for.
+    leaves would wait for; and a reader whose place in shared memory it has taken for broken would cost it all its time.
     """
     for name, value in variables(os.environ).items():
         os.environ.setdefault(name, value)
