@@ -68,7 +68,7 @@ class Bench:
         self.receiver = Receiver(bus, self.frames, self.faults, interface, kernel, self.now)
         self.supervision = Supervision(bus, self.receiver, self.frames, self.faults)
         self.machine = StateMachine(bus.monitoring.state_change)
-        self.measuring = Measuring(bus)
+        self.measuring = Measuring(bus, programs_only(interface, channel or bus.channel))
         self.readings: dict[str, dict[str, float]] = {}
         self.operational = False
         self._codec = PdoCodec(bus.drive_pdo)

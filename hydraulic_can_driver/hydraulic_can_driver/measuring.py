@@ -14,11 +14,11 @@ FULL_SCALE = 16384
 
 
 class Measuring:
-    """Follows the sensors from cycle to cycle."""
+    """Follows the sensors from cycle to cycle; `simulated`: of a plant that lives in whole periods."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, simulated: bool = False) -> None:
         self._bus = bus
-        self._check = PositionCheck(bus.limits)
+        self._check = PositionCheck(bus.limits, 1.0 / bus.rate if simulated else 0.0)
         self._spool, self._switch = bus.signal("spool"), bus.signal("switches")
         self.closed: tuple[str, ...] = ()
 

@@ -10,10 +10,13 @@ _SHARE = 0.1  # of the promised travel that a piston makes at least, under load 
 
 
 class PositionCheck:
-    """Looks at one sample after the other; the first one after `forget` has nothing to be compared with."""
+    """Looks at one sample after the other; the first one after `forget` has nothing to be compared with.
 
-    def __init__(self, limits: Limits) -> None:
-        self._limits = limits
+    `tick` [s]: what the plant moves on by at a time, where it only lives from SYNC to SYNC.
+    """
+
+    def __init__(self, limits: Limits, tick: float = 0.0) -> None:
+        self._limits, self._tick = limits, tick
         self._lowest = self._highest = math.nan  # of the position since the comparison began, m
         self._promised = self._least = self._most = 0.0  # of the travel that the opening promised since, m
         self.forget()
@@ -30,7 +33,8 @@ class PositionCheck:
         `opening` is that of the spool as a share of its travel, positive extends; `supply` the supply pressure [Pa];
         NaN where they are not measured.
         """
-        limits, last, elapsed = self._limits, self._last, (stamp_ns - self._last_ns) * 1e-9
+        limits, last = self._limits, self._last
+        elapsed = max((stamp_ns - self._last_ns) * 1e-9, self._tick)
         low, high = limits.position[0] - limits.position_margin, limits.position[1] + limits.position_margin
         if not low <= position <= high:
             return f"position {position:g} m is out of the stroke: {low:g} ... {high:g} m"

@@ -32,6 +32,16 @@ def test_jump_is_measured_over_the_time_that_passed() -> None:
     assert check.problem(24 * MS, 0.020) == "", "16 mm over ten lost samples"
 
 
+def test_a_simulated_plant_moves_a_whole_period_between_syncs_whenever_they_are_sent() -> None:
+    """At 0.85 m/s, a SYNC 0.5 ms late: 1.7 mm in 1.5 ms. A real piston cannot do that."""
+    for tick, refused in ((0.0, True), (0.002, False)):
+        check = PositionCheck(LIMITS, tick)
+        assert check.problem(0, 0.0) == ""
+        assert check.problem(round(2.5 * MS), 0.0017) == ""
+        assert ("jumps" in check.problem(4 * MS, 0.0034)) is refused
+        assert "jumps by 0.0021 m in 0.002 s" in check.problem(6 * MS, 0.0055)
+
+
 def travelled(opening: float, supply: float, position: Callable[[float], float], seconds: float = 10.0) -> str:
     """The first problem of a piston that goes as `position` [m] of the time [s] says, 500 times a second."""
     check = PositionCheck(LIMITS)
