@@ -196,6 +196,10 @@ def test_second_master(name: str, bench: Bench, wire: Any, loop_of: Callable[...
 def test_limit_switches_block_only_outwards(
     bench: Bench, wire: Any, loop_of: Callable[..., Any], wait_until: Any
 ) -> None:
+    def shut() -> None:  # or a piston that stands would be taken for a stuck sensor, 40 ms later
+        wire.answers[0x490] = wire.answers[0x490][:2] + bytes(2)
+
+    wire.on_sync = shut
     bench.boot()
     bench.start()
     loop = loop_of(bench)
