@@ -3,6 +3,7 @@
 import json
 import os
 import struct
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -158,6 +159,26 @@ def test_a_recording_is_on_the_disk_before_it_is_closed(tmp_path: Path, wait_unt
     (copy / "bag_0.mcap").write_bytes((tmp_path / "bag" / "bag_0.mcap").read_bytes())
     assert recover(copy).summary.messages == {PRESSURE.name: 50}
     assert recording.close().messages == {PRESSURE.name: 50}
+
+
+def test_a_disk_that_is_busy_costs_no_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wait_until: Any) -> None:
+    busy, done = threading.Event(), threading.Event()
+
+    def slow(handle: int) -> None:
+        busy.set()
+        done.wait()
+
+    monkeypatch.setattr(os, "fdatasync", slow)
+    recording = Recording(tmp_path / "bag")
+    recording.append(PRESSURE, pressure(START, 1.0), START)
+    assert busy.wait(60.0)
+    size = size_of(tmp_path / "bag")
+    recording.append(PRESSURE, pressure(START + 1, 1.0), START + 1)
+    try:
+        wait_until(lambda: size_of(tmp_path / "bag") > size, "a flush while the disk is busy")
+    finally:
+        done.set()
+    assert recording.close().messages == {PRESSURE.name: 2}
 
 
 def test_publish_time_is_the_stamp_or_when_it_was_sent(tmp_path: Path) -> None:

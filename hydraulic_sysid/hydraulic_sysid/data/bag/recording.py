@@ -1,4 +1,8 @@
-"""A bag that is written while messages keep coming: a queue, and a thread that empties it into the file."""
+"""A bag that is written while messages keep coming: a queue, and a thread that empties it into the file.
+
+Another thread brings the file to the disk. A disk can be busy for many seconds, and what is queued meanwhile would be
+lost with the process.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from hydraulic_sysid.data.bag.types import header_stamp
 from hydraulic_sysid.data.bag.writer import BagSummary, BagWriter
 
 FLUSH_S = 0.5
-"""The file is flushed at this interval: a crash may cost a second, this and what is queued stay below it."""
+"""The file is flushed at this interval, and brought to the disk in such pauses: a crash may cost a second."""
 # The queue is emptied in small portions, so that no burst of work stands in the way of a plant on the same core.
 _WRITE_S = 0.05
 _WRITER_NICENESS = 5
@@ -37,8 +41,13 @@ class Recording:
         self.error: Exception | None = None
         self.received: dict[str, int] = {}
         self.bytes = 0
-        self._thread = threading.Thread(target=self._run, name="bag writer", daemon=True)
-        self._thread.start()
+        self._not_synced: Exception | None = None
+        self._threads = [
+            threading.Thread(target=self._run, name="bag writer", daemon=True),
+            threading.Thread(target=self._sync, name="bag sync", daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
 
     @property
     def folder(self) -> Path:
@@ -62,7 +71,8 @@ class Recording:
         :raises OSError: the disk does not take it.
         """
         self._stopping.set()
-        self._thread.join()
+        for thread in self._threads:
+            thread.join()
         if self.error is not None:
             raise self.error
         try:
@@ -79,6 +89,8 @@ class Recording:
         flush_at = time.monotonic() + FLUSH_S
         try:
             while not self._stopping.wait(_WRITE_S):
+                if self._not_synced is not None:
+                    raise self._not_synced
                 self._write_queued()
                 if time.monotonic() >= flush_at:
                     self._writer.flush()
@@ -86,6 +98,13 @@ class Recording:
         except Exception as error:  # whoever owns the recording finds it there; a thread has nobody to raise it to
             self.error = error
             self._writer.abandon()
+
+    def _sync(self) -> None:
+        try:
+            while self.error is None and not self._stopping.wait(FLUSH_S):
+                self._writer.sync()
+        except Exception as error:  # the writing ends with it; that it has ended is no error
+            self._not_synced = error
 
     def _write_queued(self) -> None:
         queue, write = self._queue, self._writer.write

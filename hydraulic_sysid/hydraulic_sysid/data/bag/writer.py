@@ -85,8 +85,11 @@ class BagWriter:
         self._mcap.add_message(channel, log_ns, data, publish_ns, sequence & _SEQUENCE_MASK)
 
     def flush(self) -> None:
-        """End the chunk and bring everything written so far to the disk."""
+        """End the chunk and give everything written so far to the system: it outlives this process."""
         self._mcap.flush()
+
+    def sync(self) -> None:
+        """Bring what was flushed to the disk: it outlives a loss of power. May take as long as the disk likes."""
         os.fdatasync(self._stream.fileno())
 
     def close(self, custom_data: Mapping[str, str] | None = None) -> BagSummary:
@@ -104,6 +107,7 @@ class BagWriter:
         self._mcap.add_metadata("rosbag2", {"serialized_metadata": metadata.to_yaml(content)})
         self._mcap.finish()
         self.flush()
+        self.sync()
         size = self.file.stat().st_size
         metadata.write(self.folder, content)
         self._stream.close()
