@@ -16,7 +16,7 @@ from hydraulic_can_driver.bus import Bus, Node
 from hydraulic_can_driver.can_bus import hears_itself, stamps_by_wall_clock
 from hydraulic_can_driver.faults import BusFault, FaultLatch
 from hydraulic_can_driver.frames import Frames
-from hydraulic_plant_node.pacing import request_realtime
+from hydraulic_node_utils.scheduling import request_realtime
 
 SYNC, NMT, EMERGENCY, SDO_ANSWER, SDO_QUESTION, HEARTBEAT = 0x080, 0x000, 0x080, 0x580, 0x600, 0x700
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0, 4, 5, 127

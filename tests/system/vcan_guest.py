@@ -28,7 +28,7 @@ from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_can_driver.nodes import can_driver
 from hydraulic_can_driver.virtual import Reading, VirtualBench
 from hydraulic_node_utils.nodes.log_callers import know_log_callers
-from hydraulic_plant_node.pacing import request_realtime
+from hydraulic_node_utils.scheduling import request_realtime
 
 # What the virtual hydraulics do; the identification has to find it.
 GAIN, LAG, START = 0.02, 0.6, 0.1  # (m/s)/V, s, m

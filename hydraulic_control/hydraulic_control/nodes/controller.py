@@ -29,7 +29,7 @@ from hydraulic_node_utils.nodes.diagnostics import OK
 from hydraulic_node_utils.nodes.guarded_lifecycle import guard_transitions
 from hydraulic_node_utils.nodes.serving import Served, serve
 from hydraulic_node_utils.plant_report import PlantReport
-from hydraulic_plant_node.pacing import release_realtime_for_all, request_realtime_for_all
+from hydraulic_node_utils.scheduling import release_realtime_for_all, request_realtime_for_all
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 HEALTH_PERIOD_S = 0.5

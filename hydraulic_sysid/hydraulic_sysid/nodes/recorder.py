@@ -26,6 +26,7 @@ from hydraulic_node_utils.nodes import command_line
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.taking_down import take_down
 from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_node_utils.scheduling import request_realtime_for_all
 from hydraulic_sysid.data.bag import Recording, StopRule
 from hydraulic_sysid.nodes._recorder_health import RecorderHealth
 from hydraulic_sysid.nodes._recorder_intake import Intake
@@ -36,6 +37,7 @@ PARAMETERS = (
     ParameterSpec("max_duration", 0.0, "close the bag after this time; 0: never", "s", 0.0, 1e6),
     ParameterSpec("stop_on_experiment_end", False, "close when an excitation run has finished or aborted"),
     ParameterSpec("exit_when_done", False, "leave once the bag is closed"),
+    ParameterSpec("realtime_priority", 5, "FIFO priority of taking messages in where permitted, 0: none", "", 0, 98),
 )
 _POLL_S = 0.02
 _STATUS_S = 0.05
@@ -53,6 +55,8 @@ class Recorder(Node):
             raise ValueError("no folder given; say --ros-args -p output:=FOLDER")
         self._status = self.create_publisher(String, "~/status", profile("latched"))
         self._exit_when_done = values["exit_when_done"]
+        if values["realtime_priority"]:  # threads to come inherit it: those that listen, and the one that writes
+            request_realtime_for_all(values["realtime_priority"])
         self._rule = StopRule(values["max_duration"], values["stop_on_experiment_end"])
         custom = {"recorder": "hydraulic_sysid", "description": values["description"]}
         self._recording = Recording(Path(values["output"]).expanduser().absolute(), custom)

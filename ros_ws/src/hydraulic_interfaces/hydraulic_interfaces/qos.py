@@ -7,7 +7,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from hydraulic_interfaces.contract import find_topic
 
 STREAM_DEPTH = 100
-STREAM_HISTORY = 4000
+STREAM_HISTORY = 1000
 """Depth for a publisher at 1 kHz: a subscriber that missed a packet may say so only with the middleware's next
 heartbeat, up to 3 s later (Fast DDS by default), and can have it again only if it is still kept then."""
 

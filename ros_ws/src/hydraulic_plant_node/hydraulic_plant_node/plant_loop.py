@@ -15,15 +15,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from hydraulic_interfaces.samples import PlantSample
+from hydraulic_node_utils.scheduling import release_realtime_for_all, request_realtime, request_realtime_for_all
 from hydraulic_plant_node.command_gate import CommandGate
 from hydraulic_plant_node.lockstep import Lockstep, LockstepPorts
-from hydraulic_plant_node.pacing import (
-    Pacer,
-    Wakefulness,
-    release_realtime_for_all,
-    request_realtime,
-    request_realtime_for_all,
-)
+from hydraulic_plant_node.pacing import Pacer, Wakefulness
 from hydraulic_plant_node.plant_backend import PlantBackend
 from hydraulic_plant_node.rate_monitor import RateMonitor
 

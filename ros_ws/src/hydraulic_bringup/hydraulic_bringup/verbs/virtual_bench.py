@@ -22,7 +22,7 @@ from hydraulic_can_driver.virtual import VirtualBench
 from hydraulic_can_driver.virtual.faults import FAULTS, InjectedFault
 from hydraulic_can_driver.virtual.wiring import Event
 from hydraulic_node_utils import cli
-from hydraulic_plant_node.pacing import request_realtime
+from hydraulic_node_utils.scheduling import request_realtime
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.trust import add_trust_option
 
