@@ -17,8 +17,6 @@ RIGHT_FIRST = (
     benches.Bench("single", ("coulomb_friction",), "strong", 1),
     benches.Bench("single", ("valve_deadband",), "mild", 1),
     benches.Bench("single", ("presliding",), "strong", 1),
-    benches.Bench("single", ("pump_ripple",), "mild", 1),
-    benches.Bench("single", ("sensor_lag",), "strong", 1),
 )
 
 

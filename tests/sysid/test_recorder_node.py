@@ -1,6 +1,7 @@
 """The recorder as a process, fed by a publisher in another one."""
 
 import json
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -179,6 +180,22 @@ def test_it_stays_after_closing_and_tells_how_it_is(
     assert values["queued"] == "0" and int(values["received_bytes"]) > 0
     recorder.interrupt(signal.SIGTERM)
     assert recorder.wait() == 0
+
+
+def test_busy_processes_do_not_keep_it_from_taking_messages_in(
+    launch: Callable[..., Any], status_of: Any, tmp_path: Path
+) -> None:
+    """Every thread that takes them in goes before ordinary processes, where the system permits that."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except OSError:
+        pytest.skip("this user may not have real-time scheduling")
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    recorder = launch(NODE, *options(output=str(tmp_path / "bag")))
+    status_of("recording")
+    threads = [int(name) for name in os.listdir(f"/proc/{recorder.popen.pid}/task")]
+    assert len(threads) > 5
+    assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_FIFO}
 
 
 def test_an_existing_folder_is_refused(launch: Callable[..., Any], tmp_path: Path) -> None:
