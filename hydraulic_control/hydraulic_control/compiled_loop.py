@@ -1,31 +1,31 @@
 """Closed loops in one compiled function each: eight times as fast as sample by sample from Python.
 
-They are compiled for each library of effects once per process (about a second), never cached on disk: the physics that
-they call may have changed since.
+They are compiled for each law, and for each library of effects, once per process (about a second), never cached on
+disk: the law or the physics that they call may have changed since.
 """
 
 import numpy as np
 from numba import njit
 
-from hydraulic_control.kernel import clamp, step
+from hydraulic_control.law_parts import clamp
 from hydraulic_sim.embedded import POSITION, PRESSURE_A, PRESSURE_B, TRUE_POSITION
 
 
 @njit(nogil=True, error_model="numpy")
 def physical(
-    run, longest, turn, on, parameters, hydraulic, columns, x, memory, areas, resolution,
-    law, state, dt, wanted, noise, out,
+    run, longest, turn, on, parameters, hydraulic, columns, x, memory, u, first, areas, resolution,
+    step, law, state, dt, wanted, noise, out,
 ):  # fmt: skip
-    """Loop around the physical plant from the state (x, memory); both are advanced.
+    """Loop around the physical plant from the state (x, memory) and drive ``u`` (1,) at sample ``first``; all advance.
 
     ``wanted`` (N, 2) reference and its velocity, ``noise`` (N, 2) of position and force, ``areas`` (2,) of the piston,
     ``resolution`` of the position; ``out`` (N, 2) takes true position and applied drive. Returns how many samples it
     could follow.
     """
-    u, now, failure = np.zeros(1), np.empty((1, columns)), np.zeros(2)
+    now, failure = np.empty((1, columns)), np.zeros(2)
     limit = law[0].drive_limit
     for i in range(len(wanted)):
-        if run(u, dt, i * dt, longest, turn, on, parameters, hydraulic, x, memory, now, failure) < 1:
+        if run(u, dt, (first + i) * dt, longest, turn, on, parameters, hydraulic, x, memory, now, failure) < 1:
             return i
         out[i, 0], out[i, 1] = now[0, TRUE_POSITION], u[0]
         seen = now[0, POSITION] + noise[i, 0]
@@ -36,8 +36,8 @@ def physical(
     return len(wanted)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def linear(turn, push, residues, direct, late, law, state, dt, wanted, out):
+@njit(nogil=True, error_model="numpy")
+def linear(turn, push, residues, direct, late, step, law, state, dt, wanted, out):
     """Loop around an identified model at rest, its drive ``late`` samples late.
 
     Modes xₖ₊₁ = turn·xₖ + push·u, y = Re(residues·x) + direct·u; ``wanted`` and ``out`` as in `physical`.

@@ -1,30 +1,33 @@
-"""A controller as the node and the simulations use it: parameters by name around the compiled step."""
+"""A controller as the node and the simulations use it: parameters by name around the compiled step of its law."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from hydraulic_control import parameters, pole_placement
-from hydraulic_control.kernel import STATE, step
-from hydraulic_control.parameters import RECORD
+from hydraulic_control import parameters
+from hydraulic_control.compiled_law import compiled, parameter_record, state_record
+from hydraulic_control.law import Law
+from hydraulic_control.law_parts import PARAMETERS
+from hydraulic_control.laws import laws
 
 
 class Controller:
-    """NPID or one of its peers; the drive is always finite and within ``drive_limit``.
+    """One of the laws; the drive is always finite and within ``drive_limit``.
 
     :param values: parameters by name (`parameters.LAW`); the others have their defaults
     :raises HydraulicError: an unknown name or a value that is not allowed.
     """
 
+    _values: dict[str, Any]
+    _record: np.ndarray
+    _state: np.ndarray
+    _step: Callable[..., float]
+
     def __init__(self, values: Mapping[str, Any] | None = None) -> None:
-        self._values = parameters.complete(values or {})
-        self._record = np.zeros(1, RECORD)
-        self._state = np.zeros(1, STATE)
-        self._write(self._values)
+        self._adopt(parameters.complete(values or {}))
 
     @property
     def values(self) -> dict[str, Any]:
@@ -32,14 +35,19 @@ class Controller:
         return dict(self._values)
 
     @property
+    def law(self) -> Law:
+        """The law in use."""
+        return laws()[self._values["controller"]]
+
+    @property
     def drive(self) -> float:
         """The last drive [V]."""
         return float(self._state["drive"][0])
 
     @property
-    def records(self) -> tuple[np.ndarray, np.ndarray]:
-        """Parameters and state as the compiled step takes them, for loops that are compiled as a whole."""
-        return self._record, self._state
+    def compiled(self) -> tuple[Callable[..., float], np.ndarray, np.ndarray]:
+        """The compiled step, and the records of parameters and state that it takes; for loops compiled as a whole."""
+        return self._step, self._record, self._state
 
     @property
     def running(self) -> bool:
@@ -47,18 +55,23 @@ class Controller:
         return bool(self._state["running"][0])
 
     def set(self, values: Mapping[str, Any]) -> None:
-        """Change parameters while running, without a bump in the drive.
+        """Change parameters, or the law, while running, without a bump in the drive.
 
         :raises HydraulicError: as the constructor; nothing is changed then.
         """
         changed = self._values | {name: parameters.check(name, value) for name, value in values.items()}
-        self._write(changed)
+        if changed["controller"] != self._values["controller"]:
+            drive = self.drive
+            self._adopt(changed)
+            self.stop(drive)
+            return
+        self._record = _record(self.law, changed)
         self._values = changed
         self._state["rebase"] = 1.0
 
     def stop(self, drive: float = 0.0) -> None:
         """Forget everything; the next step joins on to ``drive`` [V] without a bump."""
-        self._state[:] = np.zeros(1, STATE)
+        self._state[:] = np.zeros(1, self._state.dtype)
         limit = self._values["drive_limit"]
         self._state["drive"] = min(max(drive, -limit), limit) if np.isfinite(drive) else 0.0
 
@@ -69,13 +82,21 @@ class Controller:
 
         Reference [m], its velocity [m/s], position [m] and force [N] (NaN where not measured).
         """
-        return step(self._record, self._state, dt, reference, reference_velocity, position, force)
+        return self._step(self._record, self._state, dt, reference, reference_velocity, position, force)
 
-    def _write(self, values: Mapping[str, Any]) -> None:
-        prefix = "pole_placement."
-        model = {name.removeprefix(prefix): v for name, v in values.items() if name.startswith(prefix)}
-        polynomials = asdict(pole_placement.design(**model))  # may refuse: before anything is written
-        for name, value in values.items():
-            self._record[name.replace(".", "_")] = parameters.as_number(name, value)
-        for name, value in polynomials.items():
-            self._record[name] = value
+    def _adopt(self, values: dict[str, Any]) -> None:
+        law = laws()[values["controller"]]
+        self._record, self._step = _record(law, values), compiled(law)  # may refuse: before anything is changed
+        self._state = np.zeros(1, state_record(law))
+        self._values = values
+
+
+def _record(law: Law, values: Mapping[str, Any]) -> np.ndarray:
+    """The record of a law's parameters."""
+    found = np.zeros(1, parameter_record(law))
+    for spec in (*PARAMETERS, *law.parameters):
+        if law.field(spec.name) in (found.dtype.names or ()):
+            found[law.field(spec.name)] = parameters.as_number(spec.name, values[spec.name])
+    for name, value in law.design(values).items():
+        found[name] = value
+    return found

@@ -58,7 +58,7 @@ class IdentifiedModel:
         fast = np.abs(self.poles) * dt > _APART
         push = np.where(fast, (turn - 1.0) / np.where(fast, self.poles, 1.0), dt).astype(complex)
         out, late = np.empty((len(wanted), 2)), round(self.delay / dt)
-        return out, linear(turn, push, self.residues, self.direct, late, *controller.records, dt, wanted, out)
+        return out, linear(turn, push, self.residues, self.direct, late, *controller.compiled, dt, wanted, out)
 
 
 def from_coefficients(

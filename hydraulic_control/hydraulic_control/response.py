@@ -57,7 +57,8 @@ class StepFigures:
     """Of one step.
 
     Rise time 10 … 90 % [s], settling time into ±2 % [s], overshoot [%], steady-state error [m], RMS error [m], integral
-    of the squared error [m²·s], RMS drive [V] and the mean speed of the drive [V/s]. What is not reached is infinite.
+    of the squared error [m²·s] and of its absolute value [m·s], RMS drive [V] and the mean speed of the drive [V/s].
+    What is not reached is infinite.
     """
 
     rise_time: float
@@ -66,6 +67,7 @@ class StepFigures:
     steady_state_error: float
     rms_error: float
     ise: float
+    iae: float
     effort: float
     activity: float
 
@@ -94,6 +96,7 @@ def step_figures(response: Response) -> StepFigures:
         steady_state_error=float(abs(goal - tail.mean())),
         rms_error=whole.rms_error,
         ise=float(np.sum((goal - x) ** 2) * np.median(np.diff(t))),
+        iae=whole.iae,
         effort=whole.effort,
         activity=whole.activity,
     )
@@ -101,10 +104,15 @@ def step_figures(response: Response) -> StepFigures:
 
 @dataclass(frozen=True)
 class TrackingFigures:
-    """Of any reference: RMS and largest error [m], RMS drive [V] and the mean speed of the drive [V/s]."""
+    """Of any reference.
+
+    RMS and largest error [m], integral of the absolute error [m·s], RMS drive [V] and the mean speed of the drive
+    [V/s].
+    """
 
     rms_error: float
     largest_error: float
+    iae: float
     effort: float
     activity: float
 
@@ -116,6 +124,7 @@ def tracking_figures(response: Response) -> TrackingFigures:
     return TrackingFigures(
         rms_error=float(np.sqrt(np.mean(error**2))),
         largest_error=float(np.max(np.abs(error))),
+        iae=float(np.sum(np.abs(error)) * dt),
         effort=float(np.sqrt(np.mean(response.drive**2))),
         activity=float(np.mean(np.abs(np.diff(response.drive))) / dt),
     )

@@ -41,13 +41,19 @@ def nominal(model: Model, noise: SensorNoise) -> Case:
     return Case(model.name, SimulatedPlant(model, noise))
 
 
-def scattered(model: Model, count: int, seed: int, noise: SensorNoise) -> list[Case]:
+def scattered_models(model: Model, count: int, seed: int) -> list[Model]:
     """``count`` copies with scattered parameters, and with a valve that is not quite in the middle."""
     known = set(model.keys())
     copies = scatter(model, {key: s for key, s in SCATTER.items() if key in known}, count, seed)
     offsets = np.random.default_rng(seed + 1).normal(0.0, BIAS, count)
     if model.kind == "hydraulic":
         copies = [m.with_effect("valve_null_bias", {"bias": float(b)}) for m, b in zip(copies, offsets, strict=True)]
+    return copies
+
+
+def scattered(model: Model, count: int, seed: int, noise: SensorNoise) -> list[Case]:
+    """`scattered_models` at rest behind their sensors."""
+    copies = scattered_models(model, count, seed)
     return [Case(f"scattered {i + 1}", SimulatedPlant(m, noise, seed + i)) for i, m in enumerate(copies)]
 
 

@@ -5,7 +5,7 @@ As through topics, a drive that answers the sample of one instant is applied fro
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -47,10 +47,22 @@ QUIET = SensorNoise(0.0, 0.0, 0.0)
 
 
 class SimulatedPlant:
-    """A physical model behind its sensors, from rest at ``position`` [m]; the same seed gives the same noise."""
+    """A physical model behind its sensors, from rest at ``position`` [m]; the same seed gives the same noise.
 
-    def __init__(self, model: Model, noise: SensorNoise = SensorNoise(), seed: int = 0, position: float = 0.0) -> None:
+    :param changes: in a closed loop, what the model becomes at which times [s] after the first, in their order: a load
+        that is taken up, a supply that gives way; of the same library and with the same effects
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        noise: SensorNoise = SensorNoise(),
+        seed: int = 0,
+        position: float = 0.0,
+        changes: Sequence[tuple[float, Model]] = (),
+    ) -> None:
         self._plant = Plant(model)
+        self._parts = [(0.0, self._plant), *((at, Plant(later)) for at, later in changes)]
         self._start = self._plant.initial_state(position=position)
         self._live = LivePlant(self._plant, self._start)
         self._areas = np.array([self._plant.value("piston_area_a"), self._plant.value("piston_area_b")])
@@ -74,11 +86,17 @@ class SimulatedPlant:
         """See `LoopPlant`; compiled, always from where the plant was made and with the same noise."""
         noise = self._scale * np.random.default_rng(self._seed).standard_normal((len(wanted), 2))
         out = np.full((len(wanted), 2), np.nan)
-        done = physical(
-            *self._plant.embedded(), self._start.states.copy(), self._start.memory.copy(), self._areas,
-            self._resolution, *controller.records, dt, wanted, noise, out,
-        )  # fmt: skip
-        return out, int(done)
+        x, memory, u = self._start.states.copy(), self._start.memory.copy(), np.zeros(1)
+        edges = [min(round(at / dt), len(wanted)) for at, _ in self._parts] + [len(wanted)]
+        for (_, plant), first, last in zip(self._parts, edges, edges[1:], strict=False):
+            part = slice(first, last)
+            done = physical(
+                *plant.embedded(), x, memory, u, first, self._areas, self._resolution, *controller.compiled, dt,
+                wanted[part], noise[part], out[part],
+            )  # fmt: skip
+            if done < last - first:
+                return out, first + int(done)
+        return out, len(wanted)
 
 
 def run(

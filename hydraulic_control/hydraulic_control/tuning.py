@@ -17,15 +17,12 @@ from hydraulic_control.response import Response, StepFigures, step_figures
 from hydraulic_control.scenario import Case
 from hydraulic_control.simulation import run, step_reference
 
-FREE: dict[str, tuple[str, ...]] = {
-    "npid": ("kp", "ki", "kd", "k1", "k2", "force_feedback"),
-    "pid": ("kp", "ki", "kd", "force_feedback"),
-    "pole_placement": ("pole_placement.frequency", "pole_placement.observer", "force_feedback"),
-}
-"""What is optimised of each law; everything else stays as it starts."""
+FORCE = "force_feedback"
+"""Tuned of every law, beside what the law names."""
 
 FLOOR = {"ki": 1.0, "kd": 1e-3, "force_feedback": 1e-8, "k1": 0.05, "k2": 1.0}
-"""Where the search begins for a gain that starts at 0: it moves on a logarithmic scale."""
+"""Where the search begins for a gain that starts at 0: it moves on a logarithmic scale. Others: a hundredth of their
+default."""
 
 _BEGIN_S = 1.0  # before the step: long enough for the integral to have taken up the valve's bias
 _HOPELESS = 10.0
@@ -128,19 +125,19 @@ def optimise(
     duration: float = 1.5,
     trials: int = 300,
 ) -> Tuned:
-    """Better values than ``start`` for those that are free (by default what `FREE` says of its law).
+    """Better values than ``start`` for those that are free (by default what its law names).
 
     Nelder–Mead on the logarithms, begun twice: the second time from where the first one stopped, which frees a simplex
     that has shrunk too early.
 
     :raises ControlError: a start or free names that are not allowed.
     """
-    law = Controller(start).values["controller"]
-    names = tuple(FREE[law] if free is None else free)
+    tuned = (*Controller(start).law.tuned, FORCE)
+    names = tuple(tuned if free is None else free)
     for name in names:
         if name not in SPECS or not isinstance(SPECS[name].default, float):
-            raise ControlError(f"{name!r} cannot be optimised; numbers are {', '.join(FREE[law])} …")
-    first = {name: max(float(start.get(name, SPECS[name].default)), FLOOR.get(name, 1e-9)) for name in names}
+            raise ControlError(f"{name!r} cannot be optimised; numbers are {', '.join(tuned)} …")
+    first = {name: max(float(start.get(name, SPECS[name].default)), _floor(name)) for name in names}
     best: dict[str, Any] = dict(start)
     lowest = before = cost_of(start, cases, steps, criteria, duration)
     count = 1
@@ -179,6 +176,10 @@ def best_start(
 ) -> Mapping[str, Any]:
     """The candidate of least cost."""
     return min(candidates, key=lambda values: cost_of(values, cases, steps, criteria, duration))
+
+
+def _floor(name: str) -> float:
+    return FLOOR.get(name, max(0.01 * float(SPECS[name].default), 1e-9))
 
 
 def _inside(name: str, value: float) -> float:

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hydraulic_control import pole_placement
+from hydraulic_control import polynomials as pole_placement
 from hydraulic_control.controller import Controller
-from hydraulic_control.kernel import nonlinear_gain
+from hydraulic_control.laws.npid import nonlinear_gain
 from hydraulic_control.parameters import CONTROLLERS, LAW
 from hydraulic_interfaces.errors import HydraulicError
 

@@ -1,14 +1,14 @@
 """Judge gains as the paper does: step, staircase and sine on identified models, nonlinear plant and bench.
 
 The figures stand beside the paper's. With --scatter the same step is tried on scattered copies of the plant, so that
-controllers can be compared by their median and their worst case.
+controllers can be compared by their median and their worst case. With --trials they are tried on everything else as
+well: sweep, load step, supply that falls, leakage, varying load and supply, noisy sensors; --page shows all of it.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,15 @@ from typing import Any
 from rich.console import Console
 
 from hydraulic_control import evaluation, gains_file, paper
+from hydraulic_control.comparison import COLUMNS
 from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import load_identified
 from hydraulic_control.response import Response
 from hydraulic_control.simulation import QUIET, SensorNoise
 from hydraulic_control.trajectories import KINDS
 from hydraulic_control.tuning import Criteria
-from hydraulic_control.verbs._cells import STEP_COLUMNS, step_cells
+from hydraulic_control.verbs._cells import STEP_COLUMNS, finite, step_cells
+from hydraulic_control.verbs._trials import show_trials
 from hydraulic_node_utils import cli, tables
 from hydraulic_node_utils.json_file import read_json
 from hydraulic_sim.model_file import load_model
@@ -32,6 +34,8 @@ EPILOG = """\
 examples:
   python -m hydraulic_control evaluate --gains npid pid --scatter 24
   python -m hydraulic_control evaluate --gains npid --identified runs/chirp/linear_model.json
+  python -m hydraulic_control evaluate --gains pid mpc model_inversion --trials 24 --sort rms_error --page
+  runs/laws.html
 """
 _TOLD = 0.01  # part of a response that may be missing without a word
 SEED = 2026  # of the plants that gains are judged on: not those of tuning
@@ -53,6 +57,13 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--bench", metavar="JSON", nargs="+", default=[], help="responses that the node reference kept")
     parser.add_argument("--step", metavar="METRES", type=cli.positive, default=0.05, help="step (default 0.05)")
     parser.add_argument("--scatter", metavar="N", type=cli.count, default=0, help="scattered plants (default 0)")
+    parser.add_argument("--trials", metavar="N", type=cli.count, help="all trials, and N scattered plants each")
+    keys = [key for key, *_ in COLUMNS]
+    parser.add_argument(
+        "--sort", choices=keys, default="rms_error", help="order of the trials' tables, by the worst plant"
+    )
+    parser.add_argument("--page", metavar="FILE", type=Path, help="with --trials: page to write")
+    parser.add_argument("--overwrite", action="store_true", help="replace what is at --page")
     parser.add_argument("--no-noise", action="store_true", help="sensors without noise")
     parser.add_argument("--json", action="store_true", help="print the result as JSON instead of tables")
     return cli.run(parser, _evaluate, argv)
@@ -63,6 +74,11 @@ def _evaluate(options: argparse.Namespace) -> None:
     models = [load_identified(path) for path in options.identified]
     bench = [_bench(Path(path)) for path in options.bench]
     noise = QUIET if options.no_noise else SensorNoise()
+    if options.trials is not None:
+        show_trials(options, model, noise, SEED)
+        return
+    if options.page:
+        raise ControlError("--page is for --trials N: it shows the trials")
     results = {}
     stems = [Path(name).stem for name in options.gains]
     for name, stem in zip(options.gains, stems, strict=True):
@@ -74,7 +90,7 @@ def _evaluate(options: argparse.Namespace) -> None:
             )
         results[stem if stems.count(stem) == 1 else name] = result
     if options.json:
-        print(json.dumps(_finite(results), ensure_ascii=False))
+        print(json.dumps(finite(results), ensure_ascii=False))
         return
     console = tables.console(120)
     for name, result in results.items():
@@ -152,15 +168,6 @@ def _show_scatter(console: Console, results: dict[str, Any], count: int) -> None
             if f := found[which]:
                 table.add_row(name, which, *step_cells(f), f"{f['activity']:.1f}", f"{f['cost']:.3f}", lost)
     console.print(table)
-
-
-def _finite(value: Any) -> Any:
-    """The same in JSON's own types: what is not finite becomes null."""
-    if isinstance(value, dict):
-        return {key: _finite(v) for key, v in value.items()}
-    if isinstance(value, list):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from rich.console import Console
 from hydraulic_control import gains_file, tune_run
 from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import load_identified
-from hydraulic_control.parameters import CONTROLLERS
+from hydraulic_control.parameters import CONTROLLERS, SPECS
 from hydraulic_control.relay import CriticalPoint, RelaySettings
 from hydraulic_control.scenario import nominal, scattered
 from hydraulic_control.simulation import SensorNoise
@@ -77,7 +77,7 @@ def _tune(options: argparse.Namespace) -> None:
     with console.status(f"optimising {options.controller} …"):
         tuned = tune_run.tune(
             options.controller, model, models, gains, simple, options.steps, criteria, options.plants, options.trials,
-            noise, not options.no_force_feedback,
+            noise, not options.no_force_feedback, _fixed(options),
         )  # fmt: skip
     path.write_text(gains_file.text(tuned.values, _remarks(options, tuned)), encoding="utf-8")
     if options.json:
@@ -88,6 +88,12 @@ def _tune(options: argparse.Namespace) -> None:
     _show_rules(out, gains)
     _show_tuned(out, options, model, tuned, noise)
     out.print(f"\n{path}")
+
+
+def _fixed(options: argparse.Namespace) -> dict[str, Any]:
+    """A law that is made from a model file gets the one that it is tuned on."""
+    key = f"{options.controller}.model"
+    return {key: options.model} if key in SPECS else {}
 
 
 def _measured(path: Path) -> CriticalPoint:

@@ -1,10 +1,8 @@
-"""Pole placement: the polynomials of a two-degree-of-freedom digital controller with integral action.
+"""Polynomials of a two-degree-of-freedom digital controller with integral action.
 
     R(q)·u = T(q)·r − S(q)·y,   A·R + B·S = A_m·A_o,   R = (q − 1)(q + ρ),   T = A_m(1)/B(1)·A_o
 
-for K/(s(Ts + 1)) sampled with a zero-order hold: Åström & Wittenmark, Computer-Controlled Systems, 3rd ed. 1997,
-ch. 5. The drive u as limited goes through the observer, A_o·v = T·r − S·y + (A_o − R)·u with u = sat(v), which keeps
-the integral from winding up.
+for K/(s(Ts + 1)) sampled with a zero-order hold: Åström & Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, ch. 5.
 """
 
 from __future__ import annotations

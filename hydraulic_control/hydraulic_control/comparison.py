@@ -1,0 +1,119 @@
+"""Controllers side by side: every trial on the model and on scattered copies of it, and how much delay each bears."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from hydraulic_control.response import Response, step_figures, tracking_figures
+from hydraulic_control.scenario import scattered_models
+from hydraulic_control.simulation import QUIET, SensorNoise
+from hydraulic_control.trials import TRIALS, Trial
+from hydraulic_sim.model import Model
+
+COLUMNS = (
+    ("rise_time", "Tr [s]", 1.0, 3),
+    ("settling_time", "Ts [s]", 1.0, 3),
+    ("overshoot", "OS [%]", 1.0, 2),
+    ("rms_error", "RMS error [mm]", 1e3, 4),
+    ("largest_error", "largest error [mm]", 1e3, 3),
+    ("iae", "IAE [mm·s]", 1e3, 3),
+    ("effort", "RMS drive [V]", 1.0, 3),
+    ("activity", "drive's speed [V/s]", 1.0, 1),
+)
+"""Key, heading, factor and decimals of what a table shows, where a trial has it."""
+
+MOST_DELAY_S = 0.064
+_HALVINGS = 6
+_OVERSHOOT = 25.0  # %, from which a loop is called unsteady
+
+Values = Mapping[str, Any]
+
+
+def figures(trial: Trial, response: Response) -> dict[str, float] | None:
+    """Figures of a response by name; None where the plant ran away."""
+    if not np.isfinite(response.position).all():
+        return None
+    return asdict(step_figures(response)) if trial.is_step else asdict(tracking_figures(response))
+
+
+def compare(
+    controllers: Mapping[str, Values],
+    model: Model,
+    plants: int,
+    seed: int,
+    size: float,
+    noise: SensorNoise,
+    say: Callable[[str], None] = lambda text: None,
+) -> dict[str, Any]:
+    """All controllers on all trials: on the model, and median and worst over ``plants`` scattered copies.
+
+    :return: a document: per trial and controller ``nominal``, ``median``, ``worst`` (figures by name or None), how many
+        copies ran away, and the nominal response; per controller the ``delay_margin`` [s]
+    """
+    copies = scattered_models(model, plants, seed)
+    results: dict[str, dict[str, Any]] = {}
+    for name, values in controllers.items():
+        say(name)
+        with ThreadPoolExecutor() as pool:
+            jobs = {
+                trial.name: [
+                    pool.submit(trial.response, values, one, size, noise, seed + i)
+                    for i, one in enumerate((model, *copies))
+                ]
+                for trial in TRIALS
+            }
+            done = {trial: [job.result() for job in found] for trial, found in jobs.items()}
+        trials = {trial.name: _summary(trial, done[trial.name]) for trial in TRIALS}
+        results[name] = {"values": dict(values), "trials": trials, "delay_margin": delay_margin(values, model, size)}
+    return {
+        "model": model.name,
+        "plants": plants,
+        "seed": seed,
+        "size": size,
+        "descriptions": {trial.name: trial.description for trial in TRIALS},
+        "controllers": results,
+    }
+
+
+def _summary(trial: Trial, responses: Sequence[Response]) -> dict[str, Any]:
+    nominal, *others = (figures(trial, one) for one in responses)
+    kept = [one for one in others if one is not None]
+    columns = {name: np.array([one[name] for one in kept]) for name in (kept[0] if kept else ())}
+    return {
+        "nominal": nominal,
+        "median": {name: float(np.median(c)) for name, c in columns.items()} or None,
+        "worst": {name: float(np.max(c)) for name, c in columns.items()} or None,
+        "ran_away": len(others) - len(kept),
+        "response": responses[0].as_document(),
+    }
+
+
+def delay_margin(values: Values, model: Model, size: float) -> float:
+    """The longest delay of the command [s] with which a step still settles, with less than 25 % of overshoot.
+
+    By halving the interval 0 … `MOST_DELAY_S`, without noise.
+    """
+    step = next(trial for trial in TRIALS if trial.name == "step")
+
+    def holds(delay: float) -> bool:
+        found = figures(
+            step, step.response(values, model.with_effect("command_delay", {"delay": delay}), size, QUIET, 0)
+        )
+        return found is not None and found["overshoot"] < _OVERSHOOT and np.isfinite(found["settling_time"])
+
+    low, high = 0.0, MOST_DELAY_S
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def shown(document: Mapping[str, Any], trial: str) -> list[tuple[str, str, float, int]]:
+    """The columns that a trial has."""
+    found = [c["trials"][trial]["nominal"] for c in document["controllers"].values() if c["trials"][trial]["nominal"]]
+    return [column for column in COLUMNS if found and column[0] in found[0]]

@@ -1,0 +1,53 @@
+"""Fuzzy controller on the error and its rate, with an integral beside it.
+
+M. Kalyoncu, M. Haydim, Mathematical modelling and fuzzy logic based position control of an electrohydraulic servosystem
+with internal leakage, Mechatronics 19 (2009): 7 × 7 rules; here with Sugeno's inference (`fuzzy_rules`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hydraulic_control.fuzzy_rules import SHAPE, inferred, scales, table
+from hydraulic_control.law import Law, SimpleModel, Values
+from hydraulic_control.law_parts import integrate
+
+
+def design(values: Values) -> dict[str, Any]:
+    """The rules."""
+    return {"rules": table("drive")}
+
+
+def begin(p: Any, s: Any, position: float) -> None:
+    """Nothing of its own."""
+
+
+def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
+    """Conclusion of the rules and integral."""
+    fuzzy = inferred(p.rules, reference - position, p.error, reference_velocity - s.velocity, p.rate)
+    return p.output * fuzzy + p.ki * s.integral
+
+
+def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
+    """Advance the integral."""
+    integrate(p, s, dt, e, p.ki, wanted)
+
+
+def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
+    """Several sizes of a big error."""
+    common = {"velocity_feedforward": 1.0 / simple.velocity_gain, "ki": 200.0}
+    return [{**common, "fuzzy.error": size} for size in (0.02, 0.05, 0.1)]
+
+
+LAW = Law(
+    description="fuzzy controller on error and rate, 7 × 7 rules",
+    source="Kalyoncu 2009; MacVicar-Whelan 1976; Sugeno & Takagi 1985",
+    begin=begin,
+    drive=drive,
+    end=end,
+    parameters=scales("fuzzy", 10.0),
+    derived=(("rules", SHAPE),),
+    design=design,
+    tuned=("fuzzy.error", "fuzzy.rate", "fuzzy.output", "ki"),
+    starts=starts,
+)
