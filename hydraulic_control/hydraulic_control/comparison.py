@@ -16,16 +16,16 @@ from hydraulic_control.trials import TRIALS, Trial
 from hydraulic_sim.model import Model
 
 COLUMNS = (
-    ("rise_time", "Tr [s]", 1.0, 3),
-    ("settling_time", "Ts [s]", 1.0, 3),
-    ("overshoot", "OS [%]", 1.0, 2),
-    ("rms_error", "RMS error [mm]", 1e3, 4),
-    ("largest_error", "largest error [mm]", 1e3, 3),
-    ("iae", "IAE [mm·s]", 1e3, 3),
-    ("effort", "RMS drive [V]", 1.0, 3),
-    ("activity", "drive's speed [V/s]", 1.0, 1),
+    ("rise_time", "Tr s", 1.0, 3),
+    ("settling_time", "Ts s", 1.0, 3),
+    ("overshoot", "OS %", 1.0, 2),
+    ("rms_error", "RMS mm", 1e3, 4),
+    ("largest_error", "max mm", 1e3, 3),
+    ("iae", "IAE mm·s", 1e3, 3),
+    ("effort", "drive V", 1.0, 3),
+    ("activity", "V/s", 1.0, 1),
 )
-"""Key, heading, factor and decimals of what a table shows, where a trial has it."""
+"""Key, heading, factor and decimals of what a table shows, where a trial has it; V/s: mean speed of the drive."""
 
 MOST_DELAY_S = 0.064
 _HALVINGS = 6

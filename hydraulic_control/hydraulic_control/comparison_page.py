@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 
 from hydraulic_control.comparison import shown
 
-SHOWN = 600
+SHOWN = 400
 """Points of a curve on the page."""
 
 _STYLE = """
@@ -41,7 +41,8 @@ for (const place of document.querySelectorAll("[data-figure]")) {
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>Controllers</title><style>{style}</style></head>
-<body><h1>Controllers side by side</h1><p>{head}. A click on a heading sorts; w: the worst of the copies.</p>
+<body><h1>Controllers side by side</h1><p>{head}. A click on a heading sorts;
+w: the worst of the copies; V/s: the mean speed of the drive.</p>
 <script>{plotly}</script>
 {parts}
 <script>{script}</script></body></html>
@@ -74,7 +75,7 @@ def _table(document: Mapping[str, Any], trial: str) -> str:
         cells = "".join(_cell(one[which], key, f, d) for key, _, f, d in columns for which in ("nominal", "worst"))
         rows.append(f"<tr><td>{escape(name)}</td>{cells}<td>{one['ran_away']}</td>")
         rows[-1] += f"<td data-value='{-found['delay_margin']}'>{1e3 * found['delay_margin']:.0f}</td></tr>"
-    head = f"<tr><th>controller</th>{heads}<th>ran away</th><th>delay margin [ms]</th></tr>"
+    head = f"<tr><th>controller</th>{heads}<th>ran away</th><th>bears ms late</th></tr>"
     return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
 
 

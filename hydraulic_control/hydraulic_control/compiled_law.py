@@ -86,13 +86,9 @@ def compiled(law: Law) -> Callable[..., float]:
 
     :raises ControlError: the law does not compile.
     """
-    source = Path(law.drive.__code__.co_filename)
-    rests_on = [file.read_text(encoding="utf-8") for file in (source, *_PARTS)]
-    forget = "\n".join(f"    s.{name}{'[:]' if shape else ''} = 0.0" for name, shape in law.state)
-    text = _STEP.replace("{forget}", forget)
     functions = {"begin": law.begin, "drive": law.drive, "end": law.end}
     try:
-        step = generated_code.load(f"law_{law.name}", text, [law.name, *rests_on], functions).step
+        step = generated_code.load(*_generated(law), functions).step
         with warnings.catch_warnings():  # what all laws share is compiled for the fields that all records begin with
             warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
             step(np.zeros(1, parameter_record(law)), np.zeros(1, state_record(law)), 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -100,4 +96,18 @@ def compiled(law: Law) -> Callable[..., float]:
     except OSError:
         raise
     except Exception as error:  # numba's own, and what it trips over
-        raise ControlError(f"{source}: does not compile: {type(error).__name__}: {error}") from error
+        place = law.drive.__code__.co_filename
+        raise ControlError(f"{place}: does not compile: {type(error).__name__}: {error}") from error
+
+
+def ready(law: Law) -> bool:
+    """Whether `compiled` takes a moment, not seconds: it has been compiled on this machine before."""
+    return any((generated_code.place(*_generated(law)).parent / "__pycache__").glob("*.nbi"))
+
+
+def _generated(law: Law) -> tuple[str, str, list[str]]:
+    """Name, text and what it rests on of a law's module."""
+    forget = "\n".join(f"    s.{name}{'[:]' if shape else ''} = 0.0" for name, shape in law.state)
+    sources = (Path(law.drive.__code__.co_filename), *_PARTS)
+    rests_on = [law.name, *(file.read_text(encoding="utf-8") for file in sources)]
+    return f"law_{law.name}", _STEP.replace("{forget}", forget), rests_on

@@ -47,10 +47,13 @@ class Inverse(NamedTuple):
 def inverse(name: str, size: int) -> Inverse:
     """The inverse of a model file or preset over ``size`` (odd) drives.
 
-    :raises ControlError: the model cannot be run, or does not move faster with more drive.
+    :raises ControlError: the file cannot be read, or the model does not move to both sides.
     """
-    path = Path(name)
-    return _inverse(name, path.stat().st_mtime_ns if path.is_file() else 0, size)
+    try:
+        path = Path(name)
+        return _inverse(name, path.stat().st_mtime_ns if path.is_file() else 0, size)
+    except (OSError, ValueError) as error:
+        raise ControlError(f"model_inversion.model: {error}") from None
 
 
 @lru_cache(maxsize=8)
@@ -81,7 +84,8 @@ def of_model(model: Model, size: int) -> Inverse:
     area = 0.5 * (plant.value("piston_area_a") + plant.value("piston_area_b"))
     hydraulic = model.kind == "hydraulic"
     pressure = plant.value("supply_pressure") - plant.value("tank_pressure") if hydraulic else 1.0
-    return Inverse(*table.T.copy(), lag, pressure, area if hydraulic else 0.0)
+    inverted, speeds, forces = table.T.copy()
+    return Inverse(inverted, speeds, forces, lag, pressure, area if hydraulic else 0.0)
 
 
 def _branch(points: Array, fastest: float, sign: float) -> Array:

@@ -23,6 +23,7 @@ SCATTER = {
     "spool_dynamics.frequency": 0.15,
 }
 """Standard deviations, relative to the model's values; what a model does not have is left out."""
+LATE_S = 0.01
 BIAS = 0.005
 """Standard deviation of the valve's null bias, of the rated drive."""
 
@@ -39,6 +40,11 @@ class Case:
 def nominal(model: Model, noise: SensorNoise) -> Case:
     """The model as it is."""
     return Case(model.name, SimulatedPlant(model, noise))
+
+
+def late(model: Model, noise: SensorNoise) -> Case:
+    """The model with a command that comes `LATE_S` late: what is tuned must bear that."""
+    return Case("late", SimulatedPlant(model.with_effect("command_delay", {"delay": LATE_S}), noise))
 
 
 def scattered_models(model: Model, count: int, seed: int) -> list[Model]:

@@ -13,7 +13,7 @@ from hydraulic_control.law import SimpleModel
 from hydraulic_control.laws import laws
 from hydraulic_control.margins import critical_of_identified, critical_of_model
 from hydraulic_control.relay import CriticalPoint, RelaySettings, measure
-from hydraulic_control.scenario import Case, identified, nominal, scattered
+from hydraulic_control.scenario import Case, identified, late, nominal, scattered
 from hydraulic_control.simulation import SensorNoise, SimulatedPlant
 from hydraulic_control.tuning import FORCE, Criteria, Tuned, best_start, optimise
 from hydraulic_sim.linear import closed_form
@@ -108,7 +108,8 @@ def tune(
 
     :param fixed: values that all starts have
     """
-    cases: list[Case] = [nominal(model, noise), *scattered(model, plants, SEED, noise), *identified(models)]
+    known = [nominal(model, noise), late(model, noise), *scattered(model, plants, SEED, noise)]
+    cases: list[Case] = [*known, *identified(models)]
     duration = 2.5 * max(criteria.settling, criteria.rise) + 0.3
     force = force and model.kind == "hydraulic"
     by_rules: list[Mapping[str, Any]] = [asdict(g) for g in gains.values()]

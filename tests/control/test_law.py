@@ -158,7 +158,7 @@ def test_what_is_refused_names_the_value_and_changes_nothing() -> None:
         ({"gain": 1.0}, "no parameter"),
         ({"controller": "lqr"}, "pole_placement"),
         ({"antiwindup": "some"}, "conditional_integration"),
-        ({"kp": 5.0, "pole_placement.period": 0.5}, "Nyquist"),
+        ({"controller": "pole_placement", "pole_placement.period": 0.5}, "Nyquist"),
     ):
         with pytest.raises(HydraulicError, match=complaint):
             law.set(values)

@@ -18,6 +18,9 @@ from hydraulic_control.errors import ControlError
 from hydraulic_control.inverse import of_model
 from hydraulic_control.law import SimpleModel
 from hydraulic_control.laws import VARIABLE, laws
+from hydraulic_control.response import tracking_figures
+from hydraulic_control.simulation import QUIET
+from hydraulic_control.trials import TRIALS
 from hydraulic_sim.model_file import load_model
 
 DT = 1e-3
@@ -184,6 +187,28 @@ class TestInverse:
     def test_a_model_that_does_not_move_is_refused(self) -> None:
         with pytest.raises(ControlError, match="cannot be inverted"):
             of_model(self.model.with_effect("constant_load", {"load": 3e5}), 41)
+
+
+    @pytest.mark.parametrize("name", ["nothing.yaml", "a" * 5000, "\0", "/etc"])
+    def test_a_file_that_is_none_is_told(self, name: str) -> None:
+        with pytest.raises(ControlError, match="model_inversion.model"):
+            Controller({"controller": "model_inversion", "model_inversion.model": name})
+
+    def test_what_the_diagnosis_adds_makes_the_control_better(self) -> None:
+        """A sine on a plant with a dead band that one model knows and the other does not, and the best PID."""
+        true = self.model.with_effect("valve_deadband", {"width": 0.04})
+        sine = next(trial for trial in TRIALS if trial.name == "sine")
+
+        def error(values: dict[str, Any]) -> float:
+            return tracking_figures(sine.response(values, true, 0.02, QUIET, 0)).rms_error
+
+        gains = gains_file.load("model_inversion")
+        before = error(gains)
+        found = of_model(true, 161)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("hydraulic_control.inverse.inverse", lambda name, size: found)
+            after = error(gains)
+        assert after < 0.5 * before and after < error(gains_file.load("pid")) / 3.0
 
 
 def test_every_parameter_reaches_the_record_of_its_law() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hydraulic_control.controller import Controller
 from hydraulic_control.relay import RelaySettings, measure
 from hydraulic_control.response import Response, step_figures
 from hydraulic_control.simulation import QUIET, SimulatedPlant
@@ -84,7 +85,6 @@ def test_a_step_through_the_topics_is_that_in_one_process(
     plant: Any, node: Any, client: Any, tmp_path: Path, wait_until: Any
 ) -> None:
     from hydraulic_control import gains_file
-    from hydraulic_control.controller import Controller
     from hydraulic_control.simulation import run, step_reference
 
     heard = client.collect("diagnostics")
@@ -119,6 +119,7 @@ def test_a_step_through_the_topics_is_that_in_one_process(
 
 
 def test_lifecycle_live_gains_and_stale_states(plant: Any, node: Any, client: Any, wait_until: Any) -> None:
+    Controller({"controller": "pid"})  # what was never compiled on this machine is refused while the loop runs
     heard, commands = client.collect("diagnostics"), client.collect("command")
     reference = client.publisher("reference")
     plant(*BY_THE_WALL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +10,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hydraulic_control import gains_file
+from hydraulic_control.compiled_law import compiled, ready
+from hydraulic_control.errors import ControlError
+from hydraulic_control.law import Law
+from hydraulic_control.laws import laws
 from hydraulic_control.parameters import LAW, SPECS
 from hydraulic_control.session import ControlSession
 from hydraulic_node_utils.nodes.parameters import ParameterTable
@@ -39,11 +44,15 @@ _OF_REFERENCES = {"reference_age_limit": "age_limit", "reference_timeout": "time
 class ControllerParameters:
     """The node's parameters, applied to the session as they are set; `locked` as of `ParameterTable`.
 
+    :param active: whether the loop runs, so that nothing may take seconds
     :raises ValueError: a value given at the start is not acceptable.
     """
 
-    def __init__(self, node: Node, session: ControlSession, locked: Callable[[], bool]) -> None:
-        self._node, self._session, self._loaded = node, session, ""
+    def __init__(
+        self, node: Node, session: ControlSession, locked: Callable[[], bool], active: Callable[[], bool]
+    ) -> None:
+        self._node, self._session, self._loaded, self._active = node, session, "", active
+        self._coming: tuple[str, threading.Thread] | None = None
         self.table = ParameterTable(node, PARAMETERS, self._apply, locked)
         for spec in SAFETY:
             self._apply(spec.name, self.table[spec.name])
@@ -66,9 +75,28 @@ class ControllerParameters:
         self._loaded = gains
 
     def _apply(self, name: str, value: Any) -> None:
-        if name in SPECS:
+        if name == "controller" and self._active():
+            self._begin_change(laws()[value])
+        elif name in SPECS:
             self._session.controller.set({name: value})
         elif name in _OF_REFERENCES:
             setattr(self._session.references, _OF_REFERENCES[name], value)
         else:
             setattr(self._session, name, value)
+
+    def _begin_change(self, law: Law) -> None:
+        """Load a law beside the loop, which goes on meanwhile; `watch` adopts it."""
+        if not ready(law):
+            raise ControlError(f"controller {law.name!r} must be compiled first, for seconds: set it while not active")
+        law.design(self._session.controller.values)  # may refuse
+        self._coming = law.name, threading.Thread(target=compiled, args=(law,), daemon=True)
+        self._coming[1].start()
+
+    def watch(self) -> None:
+        """Adopt the law that was asked for, once it is loaded."""
+        if self._coming is not None and not self._coming[1].is_alive():
+            name, self._coming = self._coming[0], None
+            try:
+                self._session.controller.set({"controller": name})
+            except ControlError as error:  # what it is made from has been changed meanwhile
+                self._node.get_logger().error(f"controller stays as it is: {error}")

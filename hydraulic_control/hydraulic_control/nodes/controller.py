@@ -44,7 +44,9 @@ class ControllerNode(Served, LifecycleNode):
         guard_transitions(self)
         self._state = "unconfigured"
         self._session = ControlSession(Controller())
-        self._settings = ControllerParameters(self, self._session, lambda: self._state != "unconfigured")
+        self._settings = ControllerParameters(
+            self, self._session, lambda: self._state != "unconfigured", lambda: self._state == "active"
+        )
         self._health = ControllerHealth(self.get_fully_qualified_name(), self._session)
         self._encode = CommandEncoder(CONTROLLER_NODE)
         self._command = self.create_publisher(JointState, "command", profile("command"))
@@ -105,6 +107,7 @@ class ControllerNode(Served, LifecycleNode):
     def watch(self) -> None:
         """What must happen without a message: notice silence, report health."""
         now = time.monotonic()
+        self._settings.watch()
         self._answer()
         if self._state == "active" and self._session.silence(age := self._steady() - self._heard):
             self._command.publish(self._encode(self._stamp_ns + round(age * 1e9), 0.0))

@@ -53,9 +53,9 @@ def _trial_table(document: dict[str, Any], trial: str, description: str, order: 
         cells = [" / ".join(_figure(one[w], key, f, d) for w in ("nominal", "worst")) for key, _, f, d in columns]
         worst = (one["worst"] or {}).get(order, math.inf) if not one["ran_away"] else math.inf
         rows.append((worst, (name, *cells, f"{one['ran_away']}", f"{1e3 * found['delay_margin']:.0f}")))
-    title = f"{trial}: {description}; model / worst of {document['plants']}"
+    title = f"{trial}: {description}; model / worst of {document['plants']}; late: delay that it bears"
     ordered = [cells for _, cells in sorted(rows, key=lambda row: row[0])]
-    return tables.table(title, ("|controller", *heads, ">|ran away", ">|delay margin ms"), ordered)
+    return tables.table(title, ("|controller", *heads, ">|lost", ">|late ms"), ordered)
 
 
 def _figure(figures: dict[str, float] | None, key: str, factor: float, decimals: int) -> str:

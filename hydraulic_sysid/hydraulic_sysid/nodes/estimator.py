@@ -23,6 +23,7 @@ from hydraulic_node_utils.nodes.callbacks import trigger, understood
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
 from hydraulic_node_utils.parameter_spec import ParameterSpec
+from hydraulic_node_utils.scheduling import request_realtime_for_all
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.linear.models import ArxOrder
 from hydraulic_sysid.linear.online import LiveModel, RunningArx
@@ -39,6 +40,7 @@ PARAMETERS = (
     ParameterSpec("reset_period", 0.0, "covariance reset this often; 0: only when asked for", "s", 0.0, 1e6, live=True),
     ParameterSpec("output", "position", "what is modelled: position, velocity or force"),
     ParameterSpec("save_to", "", "file that ~/save writes the ARX model to", live=True),
+    ParameterSpec("realtime_priority", 3, "FIFO priority where permitted, 0: none", "", 0, 98),
 )
 HEALTH_S = 0.5
 SILENCE_S = 1.0
@@ -75,6 +77,8 @@ class Estimator(ServedNode):
         self._heard = self._reset_at = time.monotonic()
         self._reset_period = values["reset_period"]
         self._count = self._bad = 0
+        if values["realtime_priority"]:  # what cannot keep up makes the plant send everything twice
+            request_realtime_for_all(values["realtime_priority"])
 
     def _apply(self, name: str, value: Any) -> None:
         if name == "forgetting":

@@ -60,6 +60,15 @@ def temporary_root() -> Path:
     return Path(tempfile.mkdtemp(prefix="hydraulic_sim-"))
 
 
+def place(stem: str, text: str, rests_on: Iterable[str]) -> Path:
+    """The file of a text in the cache; arguments as of `load`."""
+    digest = hashlib.sha256()
+    for part in (text, *rests_on, numba.__version__, platform.python_version()):
+        digest.update(part.encode())
+    key = digest.hexdigest()[:20]
+    return cache_root() / key / f"{stem}_{key}.py"
+
+
 def load(stem: str, text: str, rests_on: Iterable[str], functions: Mapping[str, Callable]) -> ModuleType:
     """The module that ``text`` defines; compiled code of it is found again by later processes.
 
@@ -68,11 +77,7 @@ def load(stem: str, text: str, rests_on: Iterable[str], functions: Mapping[str, 
     :param functions: what it finds under the name FUNCTIONS
     :raises NumbaError: it does not compile.
     """
-    digest = hashlib.sha256()
-    for part in (text, *rests_on, numba.__version__, platform.python_version()):
-        digest.update(part.encode())
-    key = digest.hexdigest()[:20]
-    file = cache_root() / key / f"{stem}_{key}.py"
+    file = place(stem, text, rests_on)
     try:
         return _execute(file, text, functions)
     except NumbaError:

@@ -1,0 +1,84 @@
+"""Controllers side by side: trials with disturbances, the delay that is borne, tables and page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hydraulic_control import gains_file
+from hydraulic_control.comparison import compare, delay_margin
+from hydraulic_control.comparison_page import page
+from hydraulic_control.simulation import QUIET, SensorNoise
+from hydraulic_control.trials import BEGIN_S, TRIALS
+from hydraulic_control.verbs import evaluate
+from hydraulic_sim.model_file import load_model
+
+MODEL = load_model("moog_mcr_m_1002_bench")
+TRIAL = {trial.name: trial for trial in TRIALS}
+PID, NPID = gains_file.load("pid"), gains_file.load("npid")
+
+
+@pytest.fixture(scope="module")
+def document() -> dict[str, Any]:
+    controllers = {"pid": PID, "<b>npid": NPID, "hopeless": {"controller": "pid", "kp": 1e5}}
+    return compare(controllers, MODEL, 2, 7, 0.05, SensorNoise())
+
+
+def test_every_trial_has_figures_of_every_controller(document: dict[str, Any]) -> None:
+    assert set(document["descriptions"]) == set(TRIAL)
+    for name in ("pid", "<b>npid"):
+        for trial, found in document["controllers"][name]["trials"].items():
+            assert found["ran_away"] == 0 and found["nominal"]["rms_error"] <= 2.0 * found["worst"]["rms_error"], trial
+            assert ("rise_time" in found["nominal"]) == TRIAL[trial].is_step
+            assert len(found["response"]["time"]) == len(found["response"]["position"]) > 1000
+    good, bad = (document["controllers"][name]["delay_margin"] for name in ("pid", "hopeless"))
+    assert good > 0.01 > bad
+
+
+def test_a_disturbance_comes_when_it_is_said_to() -> None:
+    held = TRIAL["load_step"].response(PID, MODEL, 0.05, QUIET, 0)
+    before = np.abs(held.position[held.time < 0.3]).max()
+    assert np.abs(held.position[held.time > 0.3]).max() > 10.0 * before
+    dropped = TRIAL["supply_drop"].response(PID, MODEL, 0.05, QUIET, 0)
+    same = TRIAL["sine"].response(PID, MODEL, 0.05, QUIET, 0)
+    early, count = dropped.time < 2.5, int(np.sum(dropped.time < 2.5))
+    assert np.array_equal(dropped.position[early], same.position[:count]) and count > 400
+    late = slice(count + 200, min(len(same.time), len(dropped.time)))
+    assert np.abs(dropped.drive[late]).max() > 1.1 * np.abs(same.drive[late]).max()
+
+
+def test_figures_are_of_what_comes_after_the_start() -> None:
+    assert TRIAL["step"].response(PID, MODEL, 0.05, QUIET, 0).time[0] == pytest.approx(-2e-3)
+    assert TRIAL["sine"].response(PID, MODEL, 0.05, QUIET, 0).time[0] == pytest.approx(2.0)
+    assert BEGIN_S >= 0.5
+
+
+def test_a_loop_that_is_damped_bears_more_delay() -> None:
+    assert delay_margin(PID, MODEL, 0.05) > delay_margin({**PID, "kp": 8.0 * PID["kp"]}, MODEL, 0.05)
+
+
+def test_the_page_needs_nothing_and_lets_no_markup_through(document: dict[str, Any]) -> None:
+    text = page(document)
+    assert "<b>npid" not in text and "&lt;b&gt;npid" in text
+    assert "<script src" not in text and "http-equiv" not in text
+    assert text.count("<h2>") == text.count("data-figure=") - text.count("[data-figure=") == len(TRIALS)
+    assert "runs away" in text or "–" in text, "what is hopeless has no settling time"
+
+
+def test_the_verb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "laws.html"
+    options = ["--gains", "pid", "npid", "--trials", "1", "--page", str(place), "--sort", "settling_time"]
+    assert evaluate.main(options) == 0
+    said = capsys.readouterr().out
+    assert all(f"{trial.name}: " in said for trial in TRIALS) and str(place) in said
+    assert place.stat().st_size > 1e6
+    assert evaluate.main(options) == 2, "nothing is overwritten"
+    capsys.readouterr()
+    assert evaluate.main(["--gains", "pid", "--trials", "0", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["controllers"]["pid"]["trials"]["step"]["worst"] is None
+    assert evaluate.main(["--page", str(tmp_path / "other.html")]) == 2
+    assert "--trials" in capsys.readouterr().err
