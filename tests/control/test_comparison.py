@@ -25,7 +25,7 @@ PID, NPID = gains_file.load("pid"), gains_file.load("npid")
 @pytest.fixture(scope="module")
 def document() -> dict[str, Any]:
     controllers = {"pid": PID, "<b>npid": NPID, "hopeless": {"controller": "pid", "kp": 1e5}}
-    return compare(controllers, MODEL, 2, 7, 0.05, SensorNoise())
+    return compare(controllers, MODEL, 1, 7, 0.05, SensorNoise())
 
 
 def test_every_trial_has_figures_of_every_controller(document: dict[str, Any]) -> None:

@@ -12,19 +12,18 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.diagnosis.search import diagnose
 
-RECORDS, SECONDS = 2, 10.0
+SECONDS = 10.0
 RIGHT_FIRST = (
     benches.Bench("single", ("coulomb_friction",), "strong", 1),
     benches.Bench("single", ("valve_deadband",), "mild", 1),
-    benches.Bench("single", ("presliding",), "strong", 1),
 )
 
 
-def diagnosed(bench: benches.Bench, folder) -> dict[str, Any]:
-    """By the first half of its first two records, which does for what is looked for here."""
+def diagnosed(bench: benches.Bench, folder, count: int = 1) -> dict[str, Any]:
+    """By the first half of its first record, or of so many: it does for what is looked for here."""
     place = benches.write(bench, folder)
     model = load_model(place / "model.yaml")
-    records = read_all(sorted(place.glob("*.csv.gz"))[:RECORDS])
+    records = read_all(sorted(place.glob("*.csv.gz"))[:count])
     return diagnose(model, [r.window(0.0, SECONDS) for r in records]).result
 
 
@@ -45,7 +44,7 @@ def test_the_hidden_effect_is_named_first(bench, tmp_path):
 def test_the_step_of_a_coarse_sensor_is_read_off_its_readings(tmp_path):
     """It is seen and not fitted, so it has no interval."""
     bench = benches.Bench("single", ("sensor_quantisation",), "mild", 1)
-    result = diagnosed(bench, tmp_path)
+    result = diagnosed(bench, tmp_path, 2)
     assert result["verdict"]["effects"] == ["sensor_quantisation"], result["verdict"]
     (step,) = result["effects"][0]["parameters"]
     assert step["value"] == pytest.approx(bench.truth()["sensor_quantisation"]["step"], rel=1e-4)
