@@ -98,9 +98,13 @@ class Station:
 
     def command(self, word: int, setpoint: int = 0, pressure: int = 0) -> str:
         """Control word and set-point, taken over at a SYNC; the status frame after it."""
+        self.order(word, setpoint, pressure)
+        return self.sync()
+
+    def order(self, word: int, setpoint: int = 0, pressure: int = 0) -> None:
+        """Control word and set-point alone: what comes after it is not read."""
         data = word.to_bytes(2, "little") + setpoint.to_bytes(2, "little", signed=True) + pressure.to_bytes(2, "little")
         self.send(DRIVE, data.hex())
-        return self.sync()
 
     def activate(self) -> None:
         """Start all nodes and lead the valve to ACTIVE."""
