@@ -107,7 +107,7 @@ def main() -> int:
             reached = reached and after <= BEST_PID * best and after <= BEFORE * before
             curves[size] = {name: response for name, (_, response) in found.items()}
     if options.picture:
-        picture(curves[SIZES[0]]).write_html(options.picture, include_plotlyjs=True)
+        picture(curves[SIZES[0]]).write_html(options.picture, config={"displayModeBar": False})
     return 0 if reached else 1
 
 
