@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import importlib
 import pkgutil
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
+
+from hydraulic_node_utils.user_module import run_file
 
 from . import base, effects, slots
 from .effect import Effect, Parameter, arguments
@@ -147,16 +148,9 @@ def _digest(content: bytes) -> str:
 
 @lru_cache(maxsize=256)
 def _executed(path: Path, source: bytes) -> Effect:
-    """The effect that ``source`` defines.
-
-    The text itself is executed, as the import system may take an edit within the same second for no edit. Its module is
-    named after the text: compiled code, which is kept by the text and not by the place of the file, refers to the name.
-    """
-    module = ModuleType(f"hydraulic_sim_user_effect_{_digest(source)[:12]}_{path.stem}")
-    module.__file__ = str(path)
-    sys.modules[module.__name__] = module
+    """The effect that ``source`` defines."""
     try:
-        exec(compile(source, str(path), "exec"), module.__dict__)
+        module = run_file(path, source, "hydraulic_sim_user_effect")
     except (Exception, SystemExit) as error:
         raise EffectError(f"{path}: {type(error).__name__}: {error}") from error
     return _named(module, path)

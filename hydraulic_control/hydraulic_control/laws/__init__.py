@@ -6,11 +6,9 @@ which nodes and verbs read; they are Python, and naming one runs it.
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import os
 import pkgutil
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -20,6 +18,7 @@ from types import ModuleType
 from hydraulic_control.errors import ControlError
 from hydraulic_control.law import Law
 from hydraulic_control.law_parts import PARAMETERS
+from hydraulic_node_utils.user_module import run_file
 
 VARIABLE = "HYDRAULIC_LAWS"
 
@@ -58,12 +57,8 @@ def _named() -> Iterator[tuple[str, ModuleType, str]]:
         path = Path(text).expanduser().resolve()
         if path.suffix != ".py" or not path.stem.isidentifier() or not path.is_file():
             raise ControlError(f"{VARIABLE}: {text!r} is no Python file named as a law can be (name.py)")
-        source = path.read_bytes()
-        module = ModuleType(f"hydraulic_control_user_law_{hashlib.sha256(source).hexdigest()[:12]}_{path.stem}")
-        module.__file__ = str(path)
-        sys.modules[module.__name__] = module
         try:
-            exec(compile(source, str(path), "exec"), module.__dict__)
+            module = run_file(path, path.read_bytes(), "hydraulic_control_user_law")
         except (Exception, SystemExit) as error:
             raise ControlError(f"{path}: {type(error).__name__}: {error}") from error
         yield path.stem, module, str(path)
