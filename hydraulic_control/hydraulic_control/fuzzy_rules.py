@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from hydraulic_control.errors import ControlError
-from hydraulic_control.law import number
+from hydraulic_control.law import Values, number
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 SETS = 7
@@ -41,6 +41,11 @@ def table(name: str) -> np.ndarray:
         raise ControlError(f"{path}: expected {SETS} rows and columns of numbers within −1 … 1")
     found.setflags(write=False)
     return found
+
+
+def drive_rules(values: Values) -> dict[str, np.ndarray]:
+    """`Law.design` of what has the table of the drive, in the field ``rules``."""
+    return {"rules": table("drive")}
 
 
 def scales(law: str, output: float) -> tuple[ParameterSpec, ParameterSpec, ParameterSpec]:

@@ -6,7 +6,7 @@ and what `Law.design` makes of them), ``s`` of what it remembers (the shared par
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -26,8 +26,12 @@ class SimpleModel(NamedTuple):
     lag: float
 
 
-def nothing(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
-    """No end of a step."""
+def begin_nothing(p: Any, s: Any, position: float) -> None:
+    """Nothing of its own to begin: all that a law remembers is 0 already."""
+
+
+def end_nothing(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
+    """Nothing of its own to advance."""
 
 
 def same(values: Values) -> dict[str, Any]:
@@ -56,12 +60,12 @@ class Law:
 
     description: str
     source: str
-    begin: Callable[..., None]
     drive: Callable[..., float]
     parameters: tuple[ParameterSpec, ...]
     tuned: tuple[str, ...]
     starts: Callable[[SimpleModel, list[Values]], list[dict[str, Any]]]
-    end: Callable[..., None] = nothing
+    begin: Callable[..., None] = begin_nothing
+    end: Callable[..., None] = end_nothing
     state: tuple[Field, ...] = ()
     derived: tuple[Field, ...] = ()
     design: Callable[[Values], Mapping[str, Any]] = same
@@ -100,3 +104,8 @@ def model_values(law: str, simple: SimpleModel) -> dict[str, float]:
 def record(fields: tuple[Field, ...]) -> np.dtype:
     """The type of a record with these fields."""
     return np.dtype([(name, np.float64, shape) if shape else (name, np.float64) for name, shape in fields])
+
+
+def fed_forward(simple: SimpleModel, starts: Iterable[Values]) -> list[dict[str, Any]]:
+    """The starts, with the velocity of the reference fed forward."""
+    return [{"velocity_feedforward": 1.0 / simple.velocity_gain, **one} for one in starts]

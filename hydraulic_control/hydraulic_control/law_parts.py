@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from numba import njit
 
@@ -102,8 +103,18 @@ def outside(value, zone):
 
 
 @njit(cache=True, error_model="numpy")
-def observe(p, s, dt):
-    """Advance the model K/(s(Ts + 1)) with the drive that is had, and a drift that keeps it where the piston is."""
+def at_limit(p, wanted):
+    """Whether the drive wanted is more than may be had: nothing is to be learnt from it."""
+    return clamp(wanted, p.drive_limit) != wanted
+
+
+def end_integral(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
+    """`Law.end` of what has Ki·∫e alone to advance."""
+    integrate(p, s, dt, e, p.ki, wanted)
+
+
+def end_observer(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
+    """`Law.end` that advances the model K/(s(Ts + 1)) with the drive that is had, and a drift that keeps it true."""
     apart = s.position - s.model_position
     s.model_position += dt * (s.model_velocity + s.drift + 2.0 * p.observer * apart)
     s.drift += dt * p.observer * p.observer * apart

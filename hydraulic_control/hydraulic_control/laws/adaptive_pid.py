@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_control.law import Law, SimpleModel, Values, model_parameters, model_values, number
+from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, model_parameters, model_values, number
 from hydraulic_control.law_parts import integrate
 
 
@@ -43,8 +43,7 @@ def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
 
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Gains by rule."""
-    model = {**model_values("adaptive_pid", simple), "velocity_feedforward": 1.0 / simple.velocity_gain}
-    return [{**model, **g} for g in gains]
+    return fed_forward(simple, ({**model_values("adaptive_pid", simple), **g} for g in gains))
 
 
 def as_is(pid: Values) -> list[dict[str, Any]]:

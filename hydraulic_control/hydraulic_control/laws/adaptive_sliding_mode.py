@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from hydraulic_control.law import Law, SimpleModel, Values, number
-from hydraulic_control.law_parts import clamp, outside
+from hydraulic_control.law_parts import at_limit, clamp, outside
 
 
 def begin(p: Any, s: Any, position: float) -> None:
@@ -31,7 +31,7 @@ def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float
 
 def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
     """Adapt, unless the drive is at its limit."""
-    if clamp(wanted, p.drive_limit) != wanted:
+    if at_limit(p, wanted):
         return
     beyond = abs(s.surface) / p.layer - 1.0
     s.gain += dt * p.gain_rate * max(beyond, -s.gain / p.most_gain)

@@ -17,7 +17,7 @@ def begin(p: Any, s: Any, position: float) -> None:
 
 
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
-    """U = T/K·(ω²·(x_r − z₁) + 2ω·(v_r − z₂) + z₂/T − z₃)."""
+    """The law: u = T/K·(ω²·(x_r − z₁) + 2ω·(v_r − z₂) + z₂/T − z₃)."""
     w = p.bandwidth
     wanted = w * w * (reference - s.z1) + 2.0 * w * (reference_velocity - s.z2)
     return p.lag / p.velocity_gain * (wanted + s.z2 / p.lag - s.z3)

@@ -8,18 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_control.fuzzy_rules import SHAPE, inferred, scales, table
-from hydraulic_control.law import Law, SimpleModel, Values
-from hydraulic_control.law_parts import integrate
-
-
-def design(values: Values) -> dict[str, Any]:
-    """The rules."""
-    return {"rules": table("drive")}
-
-
-def begin(p: Any, s: Any, position: float) -> None:
-    """Nothing of its own."""
+from hydraulic_control.fuzzy_rules import SHAPE, drive_rules, inferred, scales
+from hydraulic_control.law import Law, SimpleModel, Values, fed_forward
+from hydraulic_control.law_parts import end_integral
 
 
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
@@ -28,26 +19,19 @@ def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float
     return p.output * fuzzy + p.ki * s.integral
 
 
-def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
-    """Advance the integral."""
-    integrate(p, s, dt, e, p.ki, wanted)
-
-
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Several sizes of a big error."""
-    common = {"velocity_feedforward": 1.0 / simple.velocity_gain, "ki": 200.0}
-    return [{**common, "fuzzy.error": size} for size in (0.02, 0.05, 0.1)]
+    return fed_forward(simple, ({"ki": 200.0, "fuzzy.error": size} for size in (0.02, 0.05, 0.1)))
 
 
 LAW = Law(
     description="fuzzy controller on error and rate, 7 × 7 rules",
     source="Kalyoncu 2009; MacVicar-Whelan 1976; Sugeno & Takagi 1985",
-    begin=begin,
     drive=drive,
-    end=end,
+    end=end_integral,
     parameters=scales("fuzzy", 10.0),
     derived=(("rules", SHAPE),),
-    design=design,
+    design=drive_rules,
     tuned=("fuzzy.error", "fuzzy.rate", "fuzzy.output", "ki"),
     starts=starts,
 )

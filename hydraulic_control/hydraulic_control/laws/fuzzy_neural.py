@@ -9,14 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_control.fuzzy_rules import SETS, SHAPE, inferred, place, scales, table
-from hydraulic_control.law import Law, SimpleModel, Values, number
-from hydraulic_control.law_parts import clamp, integrate, outside
-
-
-def design(values: Values) -> dict[str, Any]:
-    """The rules that the weights begin from."""
-    return {"rules": table("drive")}
+from hydraulic_control.fuzzy_rules import SETS, SHAPE, drive_rules, inferred, place, scales
+from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
+from hydraulic_control.law_parts import at_limit, clamp, integrate, outside
 
 
 def begin(p: Any, s: Any, position: float) -> None:
@@ -35,7 +30,7 @@ def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float
 def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
     """Advance the integral; learn, unless the drive is at its limit."""
     integrate(p, s, dt, e, p.ki, wanted)
-    if clamp(wanted, p.drive_limit) != wanted:
+    if at_limit(p, wanted):
         return
     i, a = place(s.error, p.error)
     j, b = place(s.rate, p.rate)
@@ -50,8 +45,7 @@ def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
 
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Several sizes of a big error."""
-    common = {"velocity_feedforward": 1.0 / simple.velocity_gain, "ki": 200.0}
-    return [{**common, "fuzzy_neural.error": size} for size in (0.02, 0.05, 0.1)]
+    return fed_forward(simple, ({"ki": 200.0, "fuzzy_neural.error": size} for size in (0.02, 0.05, 0.1)))
 
 
 LAW = Law(
@@ -69,7 +63,7 @@ LAW = Law(
     ),
     state=(("error", ()), ("rate", ()), ("weights", SHAPE)),
     derived=(("rules", SHAPE),),
-    design=design,
+    design=drive_rules,
     tuned=tuple(f"fuzzy_neural.{n}" for n in ("error", "rate", "output", "rate_of_learning")) + ("ki",),
     starts=starts,
 )

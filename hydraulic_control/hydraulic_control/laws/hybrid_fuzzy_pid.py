@@ -8,18 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_control.fuzzy_rules import SHAPE, inferred, scales, table
-from hydraulic_control.law import Law, SimpleModel, Values
-from hydraulic_control.law_parts import integrate
-
-
-def design(values: Values) -> dict[str, Any]:
-    """The rules."""
-    return {"rules": table("drive")}
-
-
-def begin(p: Any, s: Any, position: float) -> None:
-    """Nothing of its own."""
+from hydraulic_control.fuzzy_rules import SHAPE, drive_rules, inferred, scales
+from hydraulic_control.law import Law, SimpleModel, Values, fed_forward
+from hydraulic_control.law_parts import end_integral
 
 
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
@@ -29,15 +20,9 @@ def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float
     return fuzzy + p.kp * e + p.ki * s.integral - p.kd * s.velocity
 
 
-def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
-    """Advance the integral."""
-    integrate(p, s, dt, e, p.ki, wanted)
-
-
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Half of the gains by rule."""
-    ahead = 1.0 / simple.velocity_gain
-    return [{"velocity_feedforward": ahead, **{n: 0.5 * g[n] for n in ("kp", "ki", "kd")}} for g in gains]
+    return fed_forward(simple, ({n: 0.5 * g[n] for n in ("kp", "ki", "kd")} for g in gains))
 
 
 def as_is(pid: Values) -> list[dict[str, Any]]:
@@ -48,12 +33,11 @@ def as_is(pid: Values) -> list[dict[str, Any]]:
 LAW = Law(
     description="hybrid fuzzy PID: fuzzy rules added to a PID",
     source="Ghazali 2014, Adnan 2011",
-    begin=begin,
     drive=drive,
-    end=end,
+    end=end_integral,
     parameters=scales("hybrid_fuzzy_pid", 2.0),
     derived=(("rules", SHAPE),),
-    design=design,
+    design=drive_rules,
     tuned=("kp", "ki", "kd", "hybrid_fuzzy_pid.error", "hybrid_fuzzy_pid.output"),
     starts=starts,
     follows=("pid", as_is),

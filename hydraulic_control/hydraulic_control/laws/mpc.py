@@ -15,7 +15,7 @@ import numpy as np
 from numba import objmode
 
 from hydraulic_control.law import Law, SimpleModel, Values, model_parameters, model_values, number
-from hydraulic_control.law_parts import observe
+from hydraulic_control.law_parts import end_observer
 
 _BLOCKS = (1, 2, 3, 5, 9)
 _N, _M = sum(_BLOCKS), len(_BLOCKS)
@@ -82,11 +82,6 @@ def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float
     return s.held
 
 
-def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
-    """Advance model and observer with the drive that is had."""
-    observe(p, s, dt)
-
-
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Several weights of the moves."""
     return [{**model_values("mpc", simple), "mpc.smoothness": w} for w in (1e-8, 1e-7, 1e-6)]
@@ -97,7 +92,7 @@ LAW = Law(
     source="Liang 2019, Xavier 2018; Maciejowski 2002",
     begin=begin,
     drive=drive,
-    end=end,
+    end=end_observer,
     parameters=(
         *model_parameters("mpc"),
         number("mpc.period", 5e-3, "sampling time of the prediction", "s", 1e-3, 0.1),

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from hydraulic_control.law import Law, SimpleModel, Values, number
-from hydraulic_control.law_parts import clamp, outside
+from hydraulic_control.law_parts import at_limit, clamp, outside
 
 
 def begin(p: Any, s: Any, position: float) -> None:
@@ -36,7 +36,7 @@ def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float
 
 def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
     """Adapt, unless the drive is at its limit."""
-    if clamp(wanted, p.drive_limit) != wanted:
+    if at_limit(p, wanted):
         return
     first = 1.0 / p.velocity_gain
     demand, dry = (s.model_velocity + p.slope * s.apart) * first, clamp(s.model_velocity / p.speed, 1.0)

@@ -14,7 +14,7 @@ from typing import Any
 
 from numba import njit
 
-from hydraulic_control.law import Law, SimpleModel, Values, number
+from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
 from hydraulic_control.law_parts import integrate
 
 _SHAPES = ({"k1": 3.0, "k2": 50.0}, {"k1": 0.3, "k2": 50.0})
@@ -26,10 +26,6 @@ def nonlinear_gain(e, k0, k1, k2):
     """k(e), written with a decaying exponential: no e overflows it."""
     decay = math.exp(-abs(k2 * e)) if e != 0.0 else 1.0
     return k0 + k1 * (1.0 - 2.0 * decay / (1.0 + decay * decay))
-
-
-def begin(p: Any, s: Any, position: float) -> None:
-    """Nothing of its own."""
 
 
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
@@ -46,9 +42,7 @@ def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
 
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Gains by rule, softened at small errors."""
-    return [
-        {"velocity_feedforward": 1.0 / simple.velocity_gain, **_shaped(g, shape)} for g in gains for shape in _SHAPES
-    ]
+    return fed_forward(simple, (_shaped(g, shape) for g in gains for shape in _SHAPES))
 
 
 def softened(pid: Values) -> list[dict[str, Any]]:
@@ -64,7 +58,6 @@ def _shaped(values: Values, shape: Values) -> dict[str, Any]:
 LAW = Law(
     description="nonlinear PID: gain rises with the error",
     source="Nisar & Munawar; Seraji 1998",
-    begin=begin,
     drive=drive,
     end=end,
     parameters=(

@@ -7,18 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_control.fuzzy_rules import SHAPE, inferred, scales, table
-from hydraulic_control.law import Law, SimpleModel, Values, number
+from hydraulic_control.fuzzy_rules import SHAPE, drive_rules, inferred, scales
+from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
 from hydraulic_control.law_parts import integrate, ramp
-
-
-def design(values: Values) -> dict[str, Any]:
-    """The rules."""
-    return {"rules": table("drive")}
-
-
-def begin(p: Any, s: Any, position: float) -> None:
-    """Nothing of its own."""
 
 
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
@@ -38,8 +29,7 @@ def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
 
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Gains by rule for the PID."""
-    ahead = 1.0 / simple.velocity_gain
-    return [{"velocity_feedforward": ahead, "p_fuzzy_pid.gain": max(g["kp"], 50.0), **g} for g in gains]
+    return fed_forward(simple, ({"p_fuzzy_pid.gain": max(g["kp"], 50.0), **g} for g in gains))
 
 
 def around(pid: Values) -> list[dict[str, Any]]:
@@ -50,7 +40,6 @@ def around(pid: Values) -> list[dict[str, Any]]:
 LAW = Law(
     description="proportional – fuzzy – PID, mixed by the size of the error",
     source="Wang 2009",
-    begin=begin,
     drive=drive,
     end=end,
     parameters=(
@@ -61,7 +50,7 @@ LAW = Law(
     ),
     state=(("near", ()),),
     derived=(("rules", SHAPE),),
-    design=design,
+    design=drive_rules,
     tuned=("kp", "ki", "kd", "p_fuzzy_pid.error", "p_fuzzy_pid.near", "p_fuzzy_pid.far"),
     starts=starts,
     follows=("pid", around),

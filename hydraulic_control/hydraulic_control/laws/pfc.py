@@ -16,7 +16,7 @@ import math
 from typing import Any
 
 from hydraulic_control.law import Law, SimpleModel, Values, model_parameters, model_values, number
-from hydraulic_control.law_parts import observe
+from hydraulic_control.law_parts import end_observer
 
 
 def begin(p: Any, s: Any, position: float) -> None:
@@ -36,11 +36,6 @@ def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float
     return (goal - free) / (p.velocity_gain * (p.horizon - decayed))
 
 
-def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
-    """Advance model and observer with the drive that is had."""
-    observe(p, s, dt)
-
-
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Several response times."""
     model = model_values("pfc", simple)
@@ -52,7 +47,7 @@ LAW = Law(
     source="Richalet & O'Donovan 2009; Izzuddin 2015, Richalet 2011",
     begin=begin,
     drive=drive,
-    end=end,
+    end=end_observer,
     parameters=(
         *model_parameters("pfc"),
         number("pfc.response_time", 0.15, "closed-loop response time, to 95 %", "s", 1e-2, 10.0),

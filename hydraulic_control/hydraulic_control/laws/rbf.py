@@ -10,16 +10,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hydraulic_control.law import Law, SimpleModel, Values, number
-from hydraulic_control.law_parts import clamp, integrate, outside
+from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
+from hydraulic_control.law_parts import at_limit, clamp, integrate, outside
 
 _CENTRES = 15  # over demanded speeds −1 … 1 of the scale, closer together around 0
-
-
-def begin(p: Any, s: Any, position: float) -> None:
-    """A network that knows nothing."""
-    for i in range(_CENTRES):
-        s.weights[i] = 0.0
 
 
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
@@ -40,7 +34,7 @@ def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float
 def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
     """Advance the integral; learn, unless the drive is at its limit."""
     integrate(p, s, dt, e, p.ki, wanted)
-    if clamp(wanted, p.drive_limit) != wanted:
+    if at_limit(p, wanted):
         return
     slip = dt * p.rate * outside(s.error, p.dead_zone) / s.power
     for i in range(_CENTRES):
@@ -49,8 +43,7 @@ def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
 
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Gains by rule."""
-    common = {"velocity_feedforward": 1.0 / simple.velocity_gain, "rbf.speed": 5.0 * simple.velocity_gain}
-    return [{**common, **g} for g in gains]
+    return fed_forward(simple, ({"rbf.speed": 5.0 * simple.velocity_gain, **g} for g in gains))
 
 
 def as_is(pid: Values) -> list[dict[str, Any]]:
@@ -61,7 +54,6 @@ def as_is(pid: Values) -> list[dict[str, Any]]:
 LAW = Law(
     description="PID with a radial basis function network that learns",
     source="Choi 2013; Sanner & Slotine 1992",
-    begin=begin,
     drive=drive,
     end=end,
     parameters=(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from hydraulic_control.fuzzy_rules import SHAPE, inferred, scales, table
-from hydraulic_control.law import Law, SimpleModel, Values, number
+from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
 from hydraulic_control.law_parts import integrate
 
 _TABLES = ("proportional_gain", "integral_gain", "derivative_gain")
@@ -18,10 +18,6 @@ _TABLES = ("proportional_gain", "integral_gain", "derivative_gain")
 def design(values: Values) -> dict[str, Any]:
     """The rules of each gain."""
     return {name: table(name) for name in _TABLES}
-
-
-def begin(p: Any, s: Any, position: float) -> None:
-    """Nothing of its own."""
 
 
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
@@ -41,7 +37,7 @@ def end(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
 
 def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
     """Gains by rule."""
-    return [{"velocity_feedforward": 1.0 / simple.velocity_gain, **g} for g in gains]
+    return fed_forward(simple, gains)
 
 
 def as_is(pid: Values) -> list[dict[str, Any]]:
@@ -52,7 +48,6 @@ def as_is(pid: Values) -> list[dict[str, Any]]:
 LAW = Law(
     description="self-tuning fuzzy PID: gains scheduled by fuzzy rules",
     source="Mohammed 2018, Adnan 2011; Zhao, Tomizuka & Isaka 1993",
-    begin=begin,
     drive=drive,
     end=end,
     parameters=(

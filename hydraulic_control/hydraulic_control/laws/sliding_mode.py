@@ -14,10 +14,6 @@ from hydraulic_control.law import Law, SimpleModel, Values, number
 from hydraulic_control.law_parts import clamp, integrate
 
 
-def begin(p: Any, s: Any, position: float) -> None:
-    """Nothing of its own."""
-
-
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
     """Equivalent and switching part."""
     e = reference - position
@@ -38,7 +34,6 @@ def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
 LAW = Law(
     description="sliding mode with a PID surface and a boundary layer",
     source="Cho & Edge 2000; Ghazali 2010; Slotine & Li 1991",
-    begin=begin,
     drive=drive,
     end=end,
     parameters=(
