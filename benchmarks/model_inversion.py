@@ -64,8 +64,7 @@ def records(true: Model, seed: int) -> list[Record]:
 
 def errors(values: dict[str, Any], plants: list[Model], size: float) -> tuple[np.ndarray, Response]:
     """RMS error [mm] on each plant, and the response of the first."""
-    sine = next(trial for trial in TRIALS if trial.name == "sine")
-    done = [sine.response(values, one, size, SensorNoise(), i) for i, one in enumerate(plants)]
+    done = [TRIALS["sine"].response(values, one, size, SensorNoise(), i) for i, one in enumerate(plants)]
     return np.array([1e3 * tracking_figures(one).rms_error for one in done]), done[0]
 
 

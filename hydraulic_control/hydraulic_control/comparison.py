@@ -12,7 +12,7 @@ import numpy as np
 from hydraulic_control.response import Response, step_figures, tracking_figures
 from hydraulic_control.scenario import scattered_models
 from hydraulic_control.simulation import QUIET, SensorNoise
-from hydraulic_control.trials import TRIALS, Trial
+from hydraulic_control.trials import TRIALS, Trial, trials_of
 from hydraulic_sim.model import Model
 
 COLUMNS = (
@@ -36,7 +36,7 @@ Values = Mapping[str, Any]
 
 def figures(trial: Trial, response: Response) -> dict[str, float] | None:
     """Figures of a response by name; None where the plant ran away."""
-    if not np.isfinite(response.position).all():
+    if response.ran_away:
         return None
     return asdict(step_figures(response)) if trial.is_step else asdict(tracking_figures(response))
 
@@ -55,27 +55,27 @@ def compare(
     :return: a document: per trial and controller ``nominal``, ``median``, ``worst`` (figures by name or None), how many
         copies ran away, and the nominal response; per controller the ``delay_margin`` [s]
     """
-    copies = scattered_models(model, plants, seed)
+    copies, tried = scattered_models(model, plants, seed), trials_of(model)
     results: dict[str, dict[str, Any]] = {}
-    for name, values in controllers.items():
-        say(name)
+    for controller, values in controllers.items():
+        say(controller)
         with ThreadPoolExecutor() as pool:
             jobs = {
-                trial.name: [
+                name: [
                     pool.submit(trial.response, values, one, size, noise, seed + i)
                     for i, one in enumerate((model, *copies))
                 ]
-                for trial in TRIALS
+                for name, trial in tried.items()
             }
-            done = {trial: [job.result() for job in found] for trial, found in jobs.items()}
-        trials = {trial.name: _summary(trial, done[trial.name]) for trial in TRIALS}
-        results[name] = {"values": dict(values), "trials": trials, "delay_margin": delay_margin(values, model, size)}
+            trials = {name: _summary(tried[name], [job.result() for job in found]) for name, found in jobs.items()}
+        margin = delay_margin(values, model, size)
+        results[controller] = {"values": dict(values), "trials": trials, "delay_margin": margin}
     return {
         "model": model.name,
         "plants": plants,
         "seed": seed,
         "size": size,
-        "descriptions": {trial.name: trial.description for trial in TRIALS},
+        "descriptions": {name: trial.description for name, trial in tried.items()},
         "controllers": results,
     }
 
@@ -98,12 +98,11 @@ def delay_margin(values: Values, model: Model, size: float) -> float:
 
     By halving the interval 0 … `MOST_DELAY_S`, without noise.
     """
-    step = next(trial for trial in TRIALS if trial.name == "step")
+    step = TRIALS["step"]
 
     def holds(delay: float) -> bool:
-        found = figures(
-            step, step.response(values, model.with_effect("command_delay", {"delay": delay}), size, QUIET, 0)
-        )
+        late = model.with_effect("command_delay", {"delay": delay})
+        found = figures(step, step.response(values, late, size, QUIET, 0))
         return found is not None and found["overshoot"] < _OVERSHOOT and np.isfinite(found["settling_time"])
 
     low, high = 0.0, MOST_DELAY_S

@@ -17,7 +17,7 @@ SHOWN = 400
 """Points of a curve on the page."""
 
 _STYLE = """
-:root{color-scheme:light dark}body{font:15px/1.5 system-ui,sans-serif;max-width:1150px;margin:2rem auto;padding:0 1rem}
+:root{color-scheme:light dark}body{font:15px/1.5 system-ui,sans-serif;max-width:1280px;margin:2rem auto;padding:0 1rem}
 table{border-collapse:collapse;margin:1rem 0;width:100%}th,td{padding:.25rem .6rem;text-align:right;
 border-bottom:1px solid rgba(128,138,150,.3)}th:first-child,td:first-child{text-align:left}
 th{cursor:pointer;white-space:nowrap}th[aria-sort]::after{content:" ▾"}.wide{overflow-x:auto}
@@ -42,7 +42,8 @@ _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>Controllers</title><style>{style}</style></head>
 <body><h1>Controllers side by side</h1><p>{head}. A click on a heading sorts;
-w: the worst of the copies; V/s: the mean speed of the drive.</p>
+w: the worst of the copies; V/s: mean speed of the drive; lost: copies that ran away; late: delay of the command that
+a step bears.</p>
 <script>{plotly}</script>
 {parts}
 <script>{script}</script></body></html>
@@ -73,9 +74,9 @@ def _table(document: Mapping[str, Any], trial: str) -> str:
     for name, found in document["controllers"].items():
         one = found["trials"][trial]
         cells = "".join(_cell(one[which], key, f, d) for key, _, f, d in columns for which in ("nominal", "worst"))
-        rows.append(f"<tr><td>{escape(name)}</td>{cells}<td>{one['ran_away']}</td>")
-        rows[-1] += f"<td data-value='{-found['delay_margin']}'>{1e3 * found['delay_margin']:.0f}</td></tr>"
-    head = f"<tr><th>controller</th>{heads}<th>ran away</th><th>bears ms late</th></tr>"
+        margin = f"<td data-value='{-found['delay_margin']}'>{1e3 * found['delay_margin']:.0f}</td>"
+        rows.append(f"<tr><td>{escape(name)}</td>{cells}<td>{one['ran_away']}</td>{margin}</tr>")
+    head = f"<tr><th>controller</th>{heads}<th>lost</th><th>late ms</th></tr>"
     return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
 
 
@@ -109,7 +110,7 @@ def _figure(document: Mapping[str, Any], trial: str) -> go.Figure:
     figure.update_xaxes(title="time [s]", row=2, col=1)
     clear = "rgba(0,0,0,0)"
     figure.update_layout(
-        height=520, paper_bgcolor=clear, plot_bgcolor=clear, font={"color": "#7b8490"}, margin={"t": 20}
+        height=520, paper_bgcolor=clear, plot_bgcolor=clear, font={"color": "#7b8490"}, margin={"t": 45}
     )
     figure.update_xaxes(gridcolor="rgba(128,138,150,0.22)").update_yaxes(gridcolor="rgba(128,138,150,0.22)")
     return figure

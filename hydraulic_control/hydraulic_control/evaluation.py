@@ -39,7 +39,7 @@ def settings_for(step: float) -> dict[str, dict[str, Any]]:
 
 def row(name: str, kind: str, response: Response) -> dict[str, Any]:
     """One line of the tables: what, where, and the figures."""
-    figures = {"runs_away": not bool(np.isfinite(response.position).all())}
+    figures = {"runs_away": response.ran_away}
     if not figures["runs_away"]:
         figures |= asdict(tracking_figures(response))
         if kind == "step":

@@ -33,7 +33,7 @@ class Inverse(NamedTuple):
     """Drives (N,) [V] over rising speeds (N,) [m/s], the force from the pressures (N,) [N] there.
 
     ``lag`` [s] is the mean time that the speed needs to follow the drive, ``pressure`` [Pa] supply less tank, ``area``
-    [m²] the mean of the piston's; 0 for a model without chambers.
+    [m²] the mean of the piston's.
     """
 
     drives: Array
@@ -63,6 +63,8 @@ def _inverse(name: str, edited: int, size: int) -> Inverse:
 
 def of_model(model: Model, size: int) -> Inverse:
     """As `inverse`, of a model."""
+    if model.kind != "hydraulic":
+        raise ControlError(f"{model.name}: cannot be inverted: its drive gives a force, no speed")
     plant = Plant.at_rate(model, 1.0 / _DT)
     limit, half = plant.value("drive_limit"), 0.5 * plant.value("stroke")
     fastest = abs(closed_form(model).velocity_gain) * limit
@@ -82,10 +84,9 @@ def of_model(model: Model, size: int) -> Inverse:
     back, ahead = _branch(points, fastest, -1.0), _branch(points, fastest, 1.0)
     table = _filled(np.vstack((back, np.array([[0.5 * (back[-1, 0] + ahead[0, 0]), 0.0, 0.0]]), ahead)), size)
     area = 0.5 * (plant.value("piston_area_a") + plant.value("piston_area_b"))
-    hydraulic = model.kind == "hydraulic"
-    pressure = plant.value("supply_pressure") - plant.value("tank_pressure") if hydraulic else 1.0
+    pressure = plant.value("supply_pressure") - plant.value("tank_pressure")
     inverted, speeds, forces = table.T.copy()
-    return Inverse(inverted, speeds, forces, lag, pressure, area if hydraulic else 0.0)
+    return Inverse(inverted, speeds, forces, lag, pressure, area)
 
 
 def _branch(points: Array, fastest: float, sign: float) -> Array:
@@ -110,9 +111,9 @@ def _branch(points: Array, fastest: float, sign: float) -> Array:
 
 
 def _filled(rows: Array, size: int) -> Array:
-    """With rows put in the middle of the widest steps of the drive, until there are ``size``."""
+    """With rows put in the middle of the widest steps of the speed, until there are ``size``: the same broken line."""
     while len(rows) < size:
-        widest = int(np.argmax(np.diff(rows[:, 0]) * (np.abs(np.diff(rows[:, 1])) > 0.0)))
+        widest = int(np.argmax(np.diff(rows[:, 1])))
         rows = np.insert(rows, widest + 1, 0.5 * (rows[widest] + rows[widest + 1]), axis=0)
     return rows
 

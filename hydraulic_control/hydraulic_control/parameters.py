@@ -11,19 +11,17 @@ from typing import Any
 
 from hydraulic_control.errors import ControlError
 from hydraulic_control.law import choice
-from hydraulic_control.law_parts import ANTIWINDUP, PARAMETERS
+from hydraulic_control.law_parts import PARAMETERS
 from hydraulic_control.laws import laws
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
 CONTROLLERS = tuple(laws())
-DEFAULT = "npid"
 LAW: tuple[ParameterSpec, ...] = (
-    choice("controller", DEFAULT, CONTROLLERS, f"law: {', '.join(CONTROLLERS)}"),
+    choice("controller", "npid", CONTROLLERS, f"law: {', '.join(CONTROLLERS)}"),
     *PARAMETERS,
     *(spec for law in laws().values() for spec in law.parameters),
 )
 SPECS = {spec.name: spec for spec in LAW}
-__all__ = ["ANTIWINDUP", "CONTROLLERS", "DEFAULT", "LAW", "SPECS", "as_number", "check", "complete"]
 
 
 def check(name: str, value: Any) -> Any:

@@ -24,6 +24,11 @@ class Response:
     position: Array
     drive: Array
 
+    @property
+    def ran_away(self) -> bool:
+        """Whether the plant could not be followed to the end."""
+        return not bool(np.isfinite(self.position).all())
+
     def as_document(self) -> dict[str, list[float]]:
         """Plain lists, for JSON."""
         return {name: value.tolist() for name, value in asdict(self).items()}

@@ -19,6 +19,8 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 
 PERIOD_S = 1e-3
+BEGIN_S = 1.0
+"""Of rest before anything is tried: long enough for an integral to have taken up the valve's bias."""
 ReferenceCurve = Callable[[float], tuple[float, float]]
 """Position [m] and velocity [m/s] at a time [s]."""
 

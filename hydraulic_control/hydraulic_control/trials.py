@@ -14,13 +14,10 @@ import numpy as np
 
 from hydraulic_control.controller import Controller
 from hydraulic_control.response import Response
-from hydraulic_control.simulation import QUIET, ReferenceCurve, SensorNoise, SimulatedPlant, run, step_reference
+from hydraulic_control.simulation import BEGIN_S, ReferenceCurve, SensorNoise, SimulatedPlant, run, step_reference
 from hydraulic_sim.model import Model
 
-BEGIN_S = 1.0
-"""Before anything happens: long enough for the integral to have taken up the valve's bias."""
-
-_LOAD = 0.1  # of the force of supply on the mean piston area
+_LOAD = 0.1  # of the stall force
 _DROP = 0.3  # of the supply pressure
 _LEAKAGE = 0.05  # of the rated flow at the supply pressure
 
@@ -35,6 +32,7 @@ class Trial:
     :param is_step: whether figures of a step make sense
     :param noisier: factor on the noise of the sensors
     :param counts_from: time [s] from which figures are taken, once what the start did has died away
+    :param of_oil: whether it disturbs what a mechanical plant does not have
     """
 
     name: str
@@ -45,6 +43,7 @@ class Trial:
     is_step: bool = False
     noisier: float = 1.0
     counts_from: float = 0.0
+    of_oil: bool = False
 
     def response(self, values: Mapping[str, Any], model: Model, size: float, noise: SensorNoise, seed: int) -> Response:
         """What a controller of these values does with a plant; from where figures are taken."""
@@ -91,11 +90,17 @@ def _sweep(size: float) -> ReferenceCurve:
     return at
 
 
-def loaded(model: Model, part: float) -> Model:
-    """With a load of a part of the force of supply on the piston added to that which it carries."""
+def _stall_force(model: Model) -> float:
+    """Force of the supply on the mean piston area, or of the drive at its limit [N]."""
+    if model.kind == "mechanical":
+        return abs(model.value("drive_force")) * model.value("drive_limit")
+    return 0.5 * (model.value("piston_area_a") + model.value("piston_area_b")) * model.value("supply_pressure")
+
+
+def _loaded(model: Model, part: float) -> Model:
+    """With a load of a part of the stall force added to that which it carries."""
     before = model.value("constant_load.load") if "constant_load" in model.effects else 0.0
-    area = 0.5 * (model.value("piston_area_a") + model.value("piston_area_b"))
-    return model.with_effect("constant_load", {"load": before + part * model.value("supply_pressure") * area})
+    return model.with_effect("constant_load", {"load": before + part * _stall_force(model)})
 
 
 def _supplied(model: Model, part: float) -> Model:
@@ -110,7 +115,7 @@ def _leaking(model: Model, part: float) -> Model:
 
 
 def _load_step(model: Model) -> list[tuple[float, Model]]:
-    return [(0.0, loaded(model, 0.0)), (0.3, loaded(model, -_LOAD))]
+    return [(0.0, _loaded(model, 0.0)), (0.3, _loaded(model, -_LOAD))]
 
 
 def _supply_drop(model: Model) -> list[tuple[float, Model]]:
@@ -123,12 +128,12 @@ def _leakage(model: Model) -> list[tuple[float, Model]]:
 
 def _varying(model: Model) -> list[tuple[float, Model]]:
     parts = ((0.0, 1.0), (-0.5, 1.0), (-1.0, 0.9), (0.5, 0.8), (1.0, 0.9), (0.0, 1.0))
-    states = [_supplied(loaded(model, a * _LOAD), b) for a, b in parts]
+    states = [_supplied(_loaded(model, a * _LOAD), b) for a, b in parts]
     return [(0.0, states[0]), *((2.0 + 0.7 * i, state) for i, state in enumerate(states[1:]))]
 
 
-TRIALS: tuple[Trial, ...] = (
-    Trial("step", "step", _step, 2.0, is_step=True),
+_TRIALS = (
+    Trial("step", "from rest to rest", _step, 2.0, is_step=True),
     Trial("staircase", "four steps of 0.75 s", _staircase, 3.0),
     Trial("sine", "sine of 0.5 Hz, from the second period on", _sine(0.5), 6.0, counts_from=2.0),
     Trial("sweep", "sine of half the size, 0.1 to 2 Hz in 8 s", _sweep, 8.0),
@@ -140,11 +145,16 @@ TRIALS: tuple[Trial, ...] = (
         6.0,
         _supply_drop,
         counts_from=2.0,
+        of_oil=True,
     ),
-    Trial("leakage", f"step with leakage of {_LEAKAGE:.0%} of the rated flow", _step, 2.0, _leakage, is_step=True),
+    Trial("leakage", f"step with leakage of {_LEAKAGE:.0%} of the rated flow", _step, 2.0, _leakage, True, of_oil=True),
     Trial("varying", "sine of 0.5 Hz; load and supply vary", _sine(0.5), 6.2, _varying, counts_from=2.0),
     Trial("noise", "step, sensors three times as noisy", _step, 2.0, is_step=True, noisier=3.0),
 )
+TRIALS: dict[str, Trial] = {trial.name: trial for trial in _TRIALS}
 """By their names."""
 
-__all__ = ["BEGIN_S", "QUIET", "TRIALS", "Trial", "loaded"]
+
+def trials_of(model: Model) -> dict[str, Trial]:
+    """The trials that mean something on a model."""
+    return {name: trial for name, trial in TRIALS.items() if model.kind == "hydraulic" or not trial.of_oil}

@@ -15,7 +15,7 @@ from hydraulic_control.errors import ControlError
 from hydraulic_control.parameters import SPECS
 from hydraulic_control.response import Response, StepFigures, step_figures
 from hydraulic_control.scenario import Case
-from hydraulic_control.simulation import run, step_reference
+from hydraulic_control.simulation import BEGIN_S, run, step_reference
 
 FORCE = "force_feedback"
 """Tuned of every law, beside what the law names."""
@@ -24,7 +24,6 @@ FLOOR = {"ki": 1.0, "kd": 1e-3, "force_feedback": 1e-8, "k1": 0.05, "k2": 1.0}
 """Where the search begins for a gain that starts at 0: it moves on a logarithmic scale. Others: a hundredth of their
 default."""
 
-_BEGIN_S = 1.0  # before the step: long enough for the integral to have taken up the valve's bias
 _HOPELESS = 10.0
 _WITHIN = 0.1
 
@@ -90,12 +89,12 @@ class Tuned:
 
 def try_step(values: Mapping[str, Any], case: Case, step: float, duration: float) -> Response:
     """The response to a step of ``step`` [m], which comes after a second of rest."""
-    return run(case.plant, Controller(values), step_reference(step, at=_BEGIN_S), duration + _BEGIN_S)
+    return run(case.plant, Controller(values), step_reference(step, at=BEGIN_S), duration + BEGIN_S)
 
 
 def figures_of(response: Response) -> StepFigures | None:
     """Figures of a step; None where the plant ran away."""
-    return step_figures(response) if np.isfinite(response.position).all() else None
+    return None if response.ran_away else step_figures(response)
 
 
 def cost_of(

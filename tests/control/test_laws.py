@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,13 @@ def test_a_law_is_one_short_file_that_says_what_it_is(law: str) -> None:
     assert set(found.tuned) <= set(parameters.SPECS)
     for start in found.starts(SimpleModel(0.04, 5e-3), [GAIN]):
         Controller({"controller": law, **start})
+
+
+@every_law
+def test_the_table_of_the_docs_has_it(law: str) -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs" / "control.md").read_text(encoding="utf-8")
+    (row,) = (line for line in text.splitlines() if line.startswith(f"| `{law}` |") and line.count("|") == 4)
+    assert row.endswith(f"| {laws()[law].needs or '–'} |")
 
 
 def test_no_list_of_laws_is_kept_anywhere_else() -> None:
@@ -187,6 +195,8 @@ class TestInverse:
     def test_a_model_that_does_not_move_is_refused(self) -> None:
         with pytest.raises(ControlError, match="cannot be inverted"):
             of_model(self.model.with_effect("constant_load", {"load": 3e5}), 41)
+        with pytest.raises(ControlError, match="a force, no speed"):
+            of_model(replace(self.model, kind="mechanical"), 41)
 
 
     @pytest.mark.parametrize("name", ["nothing.yaml", "a" * 5000, "\0", "/etc"])
@@ -197,7 +207,7 @@ class TestInverse:
     def test_what_the_diagnosis_adds_makes_the_control_better(self) -> None:
         """A sine on a plant with a dead band that one model knows and the other does not, and the best PID."""
         true = self.model.with_effect("valve_deadband", {"width": 0.04})
-        sine = next(trial for trial in TRIALS if trial.name == "sine")
+        sine = TRIALS["sine"]
 
         def error(values: dict[str, Any]) -> float:
             return tracking_figures(sine.response(values, true, 0.02, QUIET, 0)).rms_error

@@ -34,8 +34,7 @@ EPILOG = """\
 examples:
   python -m hydraulic_control evaluate --gains npid pid --scatter 24
   python -m hydraulic_control evaluate --gains npid --identified runs/chirp/linear_model.json
-  python -m hydraulic_control evaluate --gains pid mpc model_inversion --trials 24 --sort rms_error --page
-  runs/laws.html
+  python -m hydraulic_control evaluate --gains pid mpc model_inversion --trials 24 --page runs/laws.html
 """
 _TOLD = 0.01  # part of a response that may be missing without a word
 SEED = 2026  # of the plants that gains are judged on: not those of tuning
@@ -71,24 +70,27 @@ def main(argv: list[str] | None = None) -> int:
 
 def _evaluate(options: argparse.Namespace) -> None:
     model = load_model(options.model)
-    models = [load_identified(path) for path in options.identified]
-    bench = [_bench(Path(path)) for path in options.bench]
     noise = QUIET if options.no_noise else SensorNoise()
+    stems = [Path(name).stem for name in options.gains]
+    names = [stem if stems.count(stem) == 1 else name for name, stem in zip(options.gains, stems, strict=True)]
+    controllers = {name: gains_file.load(file) for name, file in zip(names, options.gains, strict=True)}
     if options.trials is not None:
-        show_trials(options, model, noise, SEED)
+        if options.identified or options.bench or options.scatter:
+            raise ControlError("--trials are on the model alone: not together with --identified, --bench or --scatter")
+        show_trials(options, controllers, model, noise, SEED)
         return
     if options.page:
         raise ControlError("--page is for --trials N: it shows the trials")
+    models = [load_identified(path) for path in options.identified]
+    bench = [_bench(Path(path)) for path in options.bench]
     results = {}
-    stems = [Path(name).stem for name in options.gains]
-    for name, stem in zip(options.gains, stems, strict=True):
-        values = gains_file.load(name)
+    for name, values in controllers.items():
         result = evaluation.evaluate(values, model, models, bench, options.step, noise)
         if options.scatter:
             result["scatter"] = evaluation.over_scatter(
                 values, model, options.scatter, SEED, options.step, noise, Criteria()
             )
-        results[stem if stems.count(stem) == 1 else name] = result
+        results[name] = result
     if options.json:
         print(json.dumps(finite(results), ensure_ascii=False))
         return

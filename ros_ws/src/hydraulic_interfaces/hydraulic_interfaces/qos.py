@@ -8,8 +8,9 @@ from hydraulic_interfaces.contract import find_topic
 
 STREAM_DEPTH = 100
 STREAM_HISTORY = 1000
-"""Depth for a publisher at 1 kHz: a subscriber that missed a packet may say so only with the middleware's next
-heartbeat, up to 3 s later (Fast DDS by default), and can have it again only if it is still kept then."""
+"""Depth for a publisher at 1 kHz: a subscriber that missed a packet says so at the middleware's next heartbeat (50 ms
+in the shipped profiles) and can have it again only if it is still kept then. No more than a second: what is kept for
+one that cannot keep up is sent to it again, which on a busy machine costs the publisher more than its own work."""
 
 _CLASSES = {
     "stream": (DurabilityPolicy.VOLATILE, STREAM_DEPTH),
