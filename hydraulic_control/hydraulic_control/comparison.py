@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hydraulic_control.laws import laws
 from hydraulic_control.response import Response, step_figures, tracking_figures
 from hydraulic_control.scenario import scattered_models
 from hydraulic_control.simulation import QUIET, SensorNoise
@@ -29,9 +31,13 @@ COLUMNS = (
 
 MOST_DELAY_S = 0.064
 _HALVINGS = 6
+SAME = 0.02
+"""Two laws within this part of each other are alike: tuning goes no further."""
 _OVERSHOOT = 25.0  # %, from which a loop is called unsteady
 
 Values = Mapping[str, Any]
+MODEL = "model"
+"""What a claim names that compares a law's worst plant with the model."""
 
 
 def figures(trial: Trial, response: Response) -> dict[str, float] | None:
@@ -110,6 +116,53 @@ def delay_margin(values: Values, model: Model, size: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
+
+
+def claims(document: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What is published of the laws beside what was measured: a row for each claim of each controller.
+
+    Of the scattered copies the median counts, where there are any; else the model. ``measured`` is None and ``holds``
+    too where a law that it takes was not tried or ran away.
+    """
+    of_law = {laws()[found["values"]["controller"]].name: found["trials"] for found in document["controllers"].values()}
+    usual = "median" if document["plants"] else "nominal"
+
+    def figure(trials: Mapping[str, Any] | None, trial: str, name: str, which: str = usual) -> float | None:
+        one = trials and trials.get(trial, {}).get(which)
+        return one and one[name]
+
+    rows = []
+    for controller, found in document["controllers"].items():
+        for claim in laws()[found["values"]["controller"]].claims:
+            trials, beside = found["trials"], claim.over_trial or claim.trial
+            below: float | None = 1.0
+            above = figure(trials, claim.trial, claim.figure)
+            if claim.over == MODEL:
+                above = figure(trials, claim.trial, claim.figure, "worst" if document["plants"] else usual)
+                below = figure(trials, beside, claim.figure, "nominal")
+            elif claim.over or claim.over_trial:
+                below = figure(of_law.get(claim.over) if claim.over else trials, beside, claim.figure)
+            measured = above / below if above is not None and below else None
+            holds = None if measured is None else claim.low <= measured <= claim.high
+            rows.append({"controller": controller, **asdict(claim), "measured": measured, "holds": holds})
+    return rows
+
+
+CLAIM_HEADS = ("controller", "published", "measured here", "figure", "claim", "verdict")
+
+
+def claim_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """A row of `claims` for a table: controller, claim, what is measured, the figure, what the claim asks, verdict."""
+    over = {"": f" over that of {row['over_trial']}", MODEL: ", worst copy over the model"}
+    what = f"{row['figure'].replace('_', ' ')}, {row['trial']}"
+    if row["over"] or row["over_trial"]:
+        what += over.get(row["over"], f", over that of {row['over']}")
+    asked = f"≥ {row['low']:g}" if math.isinf(row["high"]) else f"≤ {row['high']:g}"
+    measured = "–" if row["measured"] is None else f"{row['measured']:.2g}"
+    verdict = {None: "not tried", True: "holds", False: "does not hold"}[row["holds"]]
+    if row["over"] and row["measured"] is not None and abs(row["measured"] / row["high"] - 1.0) < SAME:
+        verdict = "no difference"
+    return row["controller"], row["text"], what, measured, asked, verdict
 
 
 def shown(document: Mapping[str, Any], trial: str) -> list[tuple[str, str, float, int]]:

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
 
-from hydraulic_control.comparison import shown
+from hydraulic_control.comparison import CLAIM_HEADS, claim_cells, claims, shown
 
 SHOWN = 400
 """Points of a curve on the page."""
@@ -20,6 +20,7 @@ _STYLE = """
 :root{color-scheme:light dark}body{font:15px/1.5 system-ui,sans-serif;max-width:1280px;margin:2rem auto;padding:0 1rem}
 table{border-collapse:collapse;margin:1rem 0;width:100%}th,td{padding:.25rem .6rem;text-align:right;
 border-bottom:1px solid rgba(128,138,150,.3)}th:first-child,td:first-child{text-align:left}
+.words td,.words th{text-align:left}.words td:nth-child(n+4){white-space:nowrap}
 th{cursor:pointer;white-space:nowrap}th[aria-sort]::after{content:" ▾"}.wide{overflow-x:auto}
 """
 _SCRIPT = """
@@ -58,6 +59,14 @@ def page(document: Mapping[str, Any]) -> str:
         parts.append(f'<div data-figure="figure-{i}"></div><div class="wide">{_table(document, trial)}</div>')
         text = _figure(document, trial).to_json().replace("<", "\\u003c")
         figures.append(f'<script type="application/json" id="figure-{i}">{text}</script>')
+    rows = "".join(
+        f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in claim_cells(row))}</tr>" for row in claims(document)
+    )
+    heads = "".join(f"<th>{escape(head)}</th>" for head in CLAIM_HEADS)
+    parts.append(
+        f'<h2>What is published</h2><div class="wide"><table class="words"><thead><tr>{heads}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>"
+    )
     head = (
         f"Controllers on {escape(document['model'])}: steps and sines of {1e3 * document['size']:g} mm, and "
         f"{document['plants']} scattered copies (seed {document['seed']})"

@@ -15,7 +15,7 @@ import numpy as np
 from hydraulic_control.errors import ControlError
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
-from hydraulic_sim.linear import closed_form
+from hydraulic_sim.linear import velocity_gain
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
@@ -67,7 +67,7 @@ def of_model(model: Model, size: int) -> Inverse:
         raise ControlError(f"{model.name}: cannot be inverted: its drive gives a force, no speed")
     plant = Plant.at_rate(model, 1.0 / _DT)
     limit, half = plant.value("drive_limit"), 0.5 * plant.value("stroke")
-    fastest = abs(closed_form(model).velocity_gain) * limit
+    fastest = velocity_gain(model) * limit
     count = max(round(min(_LONGEST, 2.0 * _TRAVEL * half / fastest) / _DT), 40)
     part = np.linspace(-1.0, 1.0, size // 2)
     drives = limit * np.sign(part) * part**2

@@ -20,10 +20,15 @@ Field = tuple[str, tuple[int, ...]]
 
 
 class SimpleModel(NamedTuple):
-    """K/(s(Ts + 1)) from the drive [V] to the position [m]: velocity gain K [m/(s·V)] and lag T [s]."""
+    """K/(s(Ts + 1)) from the drive [V] to the position [m]: velocity gain K [m/(s·V)] and lag T [s].
+
+    Beyond it the resonance of oil and load: its frequency [rad/s] and damping ratio.
+    """
 
     velocity_gain: float
     lag: float
+    frequency: float = 245.0
+    damping: float = 0.1
 
 
 def begin_nothing(p: Any, s: Any, position: float) -> None:
@@ -37,6 +42,27 @@ def end_nothing(p: Any, s: Any, dt: float, e: float, wanted: float) -> None:
 def same(values: Values) -> dict[str, Any]:
     """No design."""
     return {}
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What a publication says of its law, as a ratio that can be measured; a value where nothing divides it.
+
+    :param text: the claim, and whose it is
+    :param trial: what the law is tried on (`trials.TRIALS`), ``figure`` what is read there (`response`)
+    :param over: the law that it is compared with, on the same trial; "model": its worst plant with the model
+    :param over_trial: the trial that it is compared with, of the same law
+    :param low: the claim holds from here …
+    :param high: … to here
+    """
+
+    text: str
+    trial: str
+    figure: str
+    over: str = ""
+    over_trial: str = ""
+    low: float = 0.0
+    high: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -56,6 +82,7 @@ class Law:
     :param starts: where the search begins, of a simple model and PID gains by rule
     :param follows: the law whose optimum is a start as well, and its values as this one's
     :param needs: what it is made from beyond its parameters, for the user
+    :param claims: what is published of it
     """
 
     description: str
@@ -71,6 +98,7 @@ class Law:
     design: Callable[[Values], Mapping[str, Any]] = same
     follows: tuple[str, Callable[[Values], list[dict[str, Any]]]] | None = None
     needs: str = ""
+    claims: tuple[Claim, ...] = ()
     name: str = ""
 
     def field(self, parameter: str) -> str:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hydraulic_control import rules
 from hydraulic_control.errors import ControlError
@@ -16,12 +20,13 @@ from hydraulic_control.relay import CriticalPoint, RelaySettings, measure
 from hydraulic_control.scenario import Case, identified, late, nominal, scattered
 from hydraulic_control.simulation import SensorNoise, SimulatedPlant
 from hydraulic_control.tuning import FORCE, Criteria, Tuned, best_start, optimise
-from hydraulic_sim.linear import closed_form
+from hydraulic_sim.linear import poles, velocity_gain
 from hydraulic_sim.model import Model
 
 FREQUENCIES = (5.0, 10.0, 20.0, 40.0)  # rad/s, of the poles that rules place
 SEED = 1  # of the plants that gains are tuned on: not those that `evaluate` judges them on
 _FORCE_START = 1e-5  # V/N
+_STIFF = 3000.0  # rad/s, of a plant that shows no resonance
 
 
 @dataclass(frozen=True)
@@ -76,15 +81,26 @@ def by_rule(found: Sequence[CriticalResult], velocity_gain: float, lag: float) -
 
 
 def simple_model(model: Model, models: Sequence[IdentifiedModel]) -> SimpleModel:
-    """The model K/(s(Ts + 1)).
+    """The model that laws are begun from.
 
-    The gain is that of the first identified model, else of the physics; the lag is that of spool and loop.
+    Gain and resonance are those of the first identified model, where it shows them, else of the physics; the lag is
+    that of spool and loop.
+
+    :raises HydraulicError: the drive of the model gives no speed.
     """
-    gain = models[0].velocity_gain if models else closed_form(model).velocity_gain
+    gain = models[0].velocity_gain if models else velocity_gain(model)
     spool = 0.0
     if "spool_dynamics" in model.effects:
         spool = 2.0 * model.value("spool_dynamics.damping") / (6.283185 * model.value("spool_dynamics.frequency"))
-    return SimpleModel(gain, max(spool + 1.5e-3, 1e-3))
+    resonance = (models and _resonance(models[0].poles, models[0].highest)) or _resonance(poles(model), math.inf)
+    return SimpleModel(gain, max(spool + 1.5e-3, 1e-3), *(resonance or (_STIFF, 1.0)))
+
+
+def _resonance(found: NDArray[np.complex128], highest: float) -> tuple[float, float] | None:
+    """Frequency [rad/s] and damping of the slowest pair of poles that swings, below ``highest``."""
+    pairs = [p for p in found.tolist() if p.imag > 0.0 and abs(p) < 0.9 * highest and -p.real < 0.7 * abs(p)]
+    slowest = min(pairs, key=abs, default=None)
+    return slowest and (abs(slowest), max(-slowest.real / abs(slowest), 1e-3))
 
 
 def tune(
@@ -100,6 +116,8 @@ def tune(
     noise: SensorNoise,
     force: bool = True,
     fixed: Mapping[str, Any] | None = None,
+    optimiser: str = "nelder_mead",
+    seed: int = 0,
 ) -> Tuned:
     """The law's values, optimised from the best of its starts.
 
@@ -107,6 +125,7 @@ def tune(
     laws, not of where a search got to.
 
     :param fixed: values that all starts have
+    :param optimiser: one of `optimisers.OPTIMISERS`, with the ``seed`` of its chance
     """
     known = [nominal(model, noise), late(model, noise), *scattered(model, plants, SEED, noise)]
     cases: list[Case] = [*known, *identified(models)]
@@ -118,7 +137,7 @@ def tune(
     def search(kind: str, starts: Sequence[Mapping[str, Any]]) -> Tuned:
         begin = best_start([{**common, **s, "controller": kind} for s in starts], cases, steps, criteria, duration)
         free = (*laws()[kind].tuned, *([FORCE] if force else []))
-        return optimise(begin, cases, steps, criteria, free, duration, trials)
+        return optimise(begin, cases, steps, criteria, free, duration, trials, optimiser, seed)
 
     chosen = laws()[law]
     found = search(law, chosen.starts(simple, by_rules))

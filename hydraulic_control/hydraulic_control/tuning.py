@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from hydraulic_control.controller import Controller
 from hydraulic_control.errors import ControlError
+from hydraulic_control.optimisers import OPTIMISERS, Objective
 from hydraulic_control.parameters import SPECS
 from hydraulic_control.response import Response, StepFigures, step_figures
 from hydraulic_control.scenario import Case
@@ -101,11 +102,14 @@ def cost_of(
     values: Mapping[str, Any], cases: Sequence[Case], steps: Sequence[float], criteria: Criteria, duration: float
 ) -> float:
     """Cost of these values over all plants, of which the first is the model as it is, and steps [m]."""
+    Controller(values)  # refuses values that are not allowed, and is compiled once, before the threads
+    with ThreadPoolExecutor() as pool:
+        tried = [[pool.submit(try_step, values, case, step, duration) for case in cases] for step in steps]
     costs = []
-    for step in steps:
+    for step, responses in zip(steps, tried, strict=True):
         plant: StepFigures | None = None
-        for i, case in enumerate(cases):
-            figures = figures_of(try_step(values, case, step, duration))
+        for i, (case, response) in enumerate(zip(cases, responses, strict=True)):
+            figures = figures_of(response.result())
             cost = _HOPELESS if figures is None else criteria.cost(figures, step)
             if i == 0:
                 plant = figures
@@ -123,12 +127,13 @@ def optimise(
     free: Sequence[str] | None = None,
     duration: float = 1.5,
     trials: int = 300,
+    optimiser: str = "nelder_mead",
+    seed: int = 0,
 ) -> Tuned:
-    """Better values than ``start`` for those that are free (by default what its law names).
+    """Better values than ``start`` for those that are free (by default what its law names), searched for in logarithms.
 
-    Nelder–Mead on the logarithms, begun twice: the second time from where the first one stopped, which frees a simplex
-    that has shrunk too early.
-
+    :param optimiser: one of `optimisers.OPTIMISERS`
+    :param seed: of its chance
     :raises ControlError: a start or free names that are not allowed.
     """
     tuned = (*Controller(start).law.tuned, FORCE)
@@ -137,33 +142,22 @@ def optimise(
         if name not in SPECS or not isinstance(SPECS[name].default, float):
             raise ControlError(f"{name!r} cannot be optimised; numbers are {', '.join(tuned)} …")
     first = {name: max(float(start.get(name, SPECS[name].default)), _floor(name)) for name in names}
-    best: dict[str, Any] = dict(start)
-    lowest = before = cost_of(start, cases, steps, criteria, duration)
-    count = 1
+    before = cost_of(start, cases, steps, criteria, duration)
+
+    def values_at(x: np.ndarray) -> dict[str, Any]:
+        return dict(start) | {n: _inside(n, first[n] * math.exp(v)) for n, v in zip(names, x.tolist(), strict=True)}
 
     def cost(x: np.ndarray) -> float:
-        nonlocal best, lowest, count
-        count += 1
-        values = dict(start) | {n: _inside(n, first[n] * math.exp(v)) for n, v in zip(names, x.tolist(), strict=True)}
         try:
-            now = cost_of(values, cases, steps, criteria, duration)
+            return cost_of(values_at(x), cases, steps, criteria, duration)
         except ControlError:  # poles that its period cannot have
             return 2.0 * _HOPELESS
-        if now < lowest:
-            best, lowest = values, now
-        return now
 
-    origin: np.ndarray = np.zeros(len(names))
-    for share in (0.6, 0.4):
-        simplex = np.vstack([origin, origin + np.diag(np.where(np.arange(len(names)) % 2, 0.7, 0.5))])
-        minimize(
-            cost,
-            origin,
-            method="Nelder-Mead",
-            options={"initial_simplex": simplex, "maxfev": round(share * trials), "adaptive": True, "fatol": 1e-4},
-        )
-        origin = np.array([math.log(max(float(best.get(n, first[n])), 1e-12) / first[n]) for n in names])
-    return Tuned(best, lowest, before, count)
+    objective = Objective(cost, len(names), before)
+    if trials:
+        OPTIMISERS[optimiser](objective, trials, seed)
+    better = objective.lowest < before
+    return Tuned(values_at(objective.best) if better else dict(start), objective.lowest, before, objective.trials)
 
 
 def best_start(

@@ -170,6 +170,30 @@ def closed_form(model: Model) -> ClosedForm:
     )
 
 
+def velocity_gain(model: Model) -> float:
+    """Speed per volt [m/(s·V)] of a piston without load, the mean of both directions; of any areas.
+
+    Two orifices in series, ṽ = q·√((p_S − p_T·A_out/A_in)/(A_in² + A_out³/A_in)) with q the flow of a land per volt and
+    √Pa (N. D. Manring, Hydraulic Control Systems, 2005, sec. 4); for equal areas that of `closed_form`. Of a mechanical
+    axis: the force of the drive over the viscous friction.
+
+    :raises SimulationError: a mechanical axis without viscous friction: its drive gives no speed.
+    """
+    if model.kind == "mechanical":
+        drag = model.value("viscous_friction.coefficient") if "viscous_friction" in model.effects else 0.0
+        if not drag > 0.0:
+            raise SimulationError(f"{model.name}: a mechanical axis without viscous friction has no velocity gain")
+        return abs(model.value("drive_force")) / drag
+    land = model.value("valve_flow") / math.sqrt(model.value("valve_drop")) / model.value("drive_limit")
+    supply, tank = model.value("supply_pressure"), model.value("tank_pressure")
+    areas = model.value("piston_area_a"), model.value("piston_area_b")
+    speeds = [
+        land * math.sqrt(max(supply - tank * out / into, 0.0) / (into**2 + out**3 / into))
+        for into, out in (areas, areas[::-1])
+    ]
+    return 0.5 * sum(speeds)
+
+
 def _smooth_plant(model: Model) -> tuple[Plant, dict[str, int]]:
     """The plant without dry friction, and the states that take part."""
     smooth = model

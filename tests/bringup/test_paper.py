@@ -75,6 +75,22 @@ def test_every_rmse_of_the_grid_is_printed(run: Any) -> None:
         assert all(math.isfinite(row["models"][kind]["rmse"]) for kind in study.KINDS)
 
 
+def test_what_the_reviewed_works_did_is_done_here(run: Any) -> None:
+    rows = {(r["authors"], r["excitation"]): r for r in run[1]["reviewed"]}
+    assert len(rows) == len(printed.REVIEWED) == 6
+    for authors, excitation, fit in (
+        ("Rahmat 2010", "multisine", 92.8), ("Izzuddin 2015", "multisine", 95.86), ("Izzuddin 2015", "step", 94.67),
+        ("Ishak 2006", "multisine", 91.16),
+    ):  # fmt: skip
+        row = rows[authors, excitation]
+        assert row["printed_best_fit"] == fit and not row["why"]
+        assert row["best_fit"] >= fit, "a plant that is simulated has no less to offer"
+        assert f"({fit:g} %)" in run[2]
+    assert rows["Rahmat 2010", "multisine"]["model"] == "ARX(4, 4, 1)"
+    assert rows["Ren 2018", "chirp"]["model"] == "fourth-order transfer function"
+    assert all(r["best_fit_one_step"] is None or r["best_fit_one_step"] > 90.0 for r in rows.values())
+
+
 def test_the_papers_figures_stand_beside_ours(run: Any) -> None:
     said = " ".join(run[2].split())
     for figure in ("98.79 %", "99.17 %", "0.00301", "0.002918", "92.8 %", "(0.28)", "(4.3)"):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hydraulic_control import gains_file
-from hydraulic_control.comparison import compare, delay_margin
+from hydraulic_control.comparison import claim_cells, claims, compare, delay_margin
 from hydraulic_control.comparison_page import page
 from hydraulic_control.simulation import BEGIN_S, QUIET, SensorNoise
 from hydraulic_control.trials import TRIALS, trials_of
@@ -36,6 +36,29 @@ def test_every_trial_has_figures_of_every_controller(document: dict[str, Any]) -
             assert len(found["response"]["time"]) == len(found["response"]["position"]) > 1000
     good, bad = (document["controllers"][name]["delay_margin"] for name in ("pid", "hopeless"))
     assert good > 0.01 > bad
+
+
+def test_what_is_published_stands_beside_what_was_measured(document: dict[str, Any]) -> None:
+    rows = {(row["controller"], row["text"]): row for row in claims(document)}
+    npid = document["controllers"]["<b>npid"]["trials"]["step"]["median"]
+    (settles,) = (row for (name, text), row in rows.items() if name == "<b>npid" and "settles" in text)
+    assert settles["measured"] == npid["settling_time"] and settles["holds"]
+    (alike,) = (row for (name, _), row in rows.items() if name == "pid")
+    trials = document["controllers"]["pid"]["trials"]["step"]
+    assert alike["measured"] == trials["worst"]["rise_time"] / trials["nominal"]["rise_time"]
+    (lost,) = (row for (name, _), row in rows.items() if name == "hopeless")
+    assert not lost["holds"]
+    assert claim_cells(settles)[3:] == (f"{npid['settling_time']:.2g}", "≤ 3", "holds")
+
+
+def test_a_claim_over_a_law_that_was_not_tried_stays_open(document: dict[str, Any]) -> None:
+    law = {**document["controllers"]["pid"], "values": {"controller": "mrac"}}
+    alone = {**document, "controllers": {"mrac": law}}
+    assert [(row["measured"], row["holds"]) for row in claims(alone)] == [(None, None)]
+    both = {**document, "controllers": {"mrac": law, "pid": document["controllers"]["pid"]}}
+    (row,) = (row for row in claims(both) if row["controller"] == "mrac")
+    assert row["measured"] == 1.0 and row["holds"]
+    assert claim_cells(row)[2] == "rms error, sine, over that of pid"
 
 
 def test_a_disturbance_comes_when_it_is_said_to() -> None:
@@ -76,7 +99,8 @@ def test_the_page_needs_nothing_and_lets_no_markup_through(document: dict[str, A
     text = page(document)
     assert "<b>npid" not in text and "&lt;b&gt;npid" in text
     assert "<script src" not in text and "http-equiv" not in text
-    assert text.count("<h2>") == text.count("data-figure=") - text.count("[data-figure=") == len(TRIALS)
+    assert text.count("<h2>") - 1 == text.count("data-figure=") - text.count("[data-figure=") == len(TRIALS)
+    assert "What is published" in text and "almost alike in simulation" in text
     assert 'data-value="Infinity"' in text, "what is hopeless does not settle"
 
 

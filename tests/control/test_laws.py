@@ -6,7 +6,7 @@ import math
 import os
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 from hydraulic_control import gains_file, parameters
+from hydraulic_control.comparison import MODEL
 from hydraulic_control.controller import Controller
 from hydraulic_control.errors import ControlError
 from hydraulic_control.inverse import of_model
 from hydraulic_control.law import SimpleModel
 from hydraulic_control.laws import VARIABLE, laws
-from hydraulic_control.response import tracking_figures
+from hydraulic_control.response import StepFigures, TrackingFigures, tracking_figures
 from hydraulic_control.simulation import QUIET
 from hydraulic_control.trials import TRIALS
 from hydraulic_sim.model_file import load_model
@@ -62,6 +63,25 @@ def test_a_law_is_one_short_file_that_says_what_it_is(law: str) -> None:
     assert set(found.tuned) <= set(parameters.SPECS)
     for start in found.starts(SimpleModel(0.04, 5e-3), [GAIN]):
         Controller({"controller": law, **start})
+
+
+@every_law
+def test_a_law_says_what_is_published_of_it_in_terms_of_the_trials(law: str) -> None:
+    claims = laws()[law].claims
+    assert claims
+    figures = {f.name for kind in (StepFigures, TrackingFigures) for f in fields(kind)}
+    for claim in claims:
+        assert claim.text and claim.low < claim.high and claim.figure in figures
+        assert claim.trial in TRIALS and claim.over_trial in ("", *TRIALS)
+        assert claim.over in ("", MODEL, *set(laws()) - {law})
+
+
+def test_a_low_bandwidth_stays_below_the_resonance() -> None:
+    values = {"controller": "low_bandwidth", "low_bandwidth.frequency": 60.0, "low_bandwidth.damping": 0.05}
+    Controller({**values, "low_bandwidth.bandwidth": 5.0})
+    for bandwidth in (30.0, 80.0):
+        with pytest.raises(ControlError, match="at the resonance of 60 rad/s"):
+            Controller({**values, "low_bandwidth.bandwidth": bandwidth})
 
 
 @every_law
@@ -197,7 +217,6 @@ class TestInverse:
             of_model(self.model.with_effect("constant_load", {"load": 3e5}), 41)
         with pytest.raises(ControlError, match="a force, no speed"):
             of_model(replace(self.model, kind="mechanical"), 41)
-
 
     @pytest.mark.parametrize("name", ["nothing.yaml", "a" * 5000, "\0", "/etc"])
     def test_a_file_that_is_none_is_told(self, name: str) -> None:

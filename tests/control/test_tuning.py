@@ -15,13 +15,16 @@ from hydraulic_control.controller import Controller
 from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import from_coefficients
 from hydraulic_control.margins import critical_point, grid
+from hydraulic_control.optimisers import OPTIMISERS, Objective
 from hydraulic_control.parameters import CONTROLLERS
 from hydraulic_control.relay import CriticalPoint, Relay, RelaySettings, measure
 from hydraulic_control.scenario import nominal, scattered
 from hydraulic_control.simulation import QUIET, SensorNoise, SimulatedPlant, run, step_reference
+from hydraulic_control.tune_run import simple_model
 from hydraulic_control.tuning import Criteria, cost_of, figures_of, optimise, try_step
 from hydraulic_control.verbs import evaluate, tune
 from hydraulic_node_utils.parameter_spec import ParameterError
+from hydraulic_sim.linear import poles, velocity_gain
 from hydraulic_sim.model_file import load_model
 
 MODEL = load_model("moog_mcr_m_1002_bench")
@@ -109,6 +112,45 @@ def test_optimising_lowers_the_cost_and_keeps_what_is_not_free() -> None:
     assert tuned.trials <= 40
     with pytest.raises(ControlError, match="cannot be optimised"):
         optimise(start, cases, [0.05], Criteria(), ["antiwindup"])
+
+
+def bowl(x: np.ndarray) -> float:
+    """Least at (0.7, −0.4), where it is 0.1; narrow one way."""
+    return float(0.1 + (x[0] - 0.7) ** 2 + 9.0 * (x[1] + 0.4) ** 2)
+
+
+@pytest.mark.parametrize("name", OPTIMISERS)
+def test_an_optimiser_finds_the_least_in_its_trials_and_finds_it_again(name: str) -> None:
+    found = []
+    for seed in (3, 3, 4):
+        objective = Objective(bowl, 2, bowl(np.zeros(2)))
+        OPTIMISERS[name](objective, 240, seed)
+        assert 100 < objective.trials <= 245
+        assert objective.lowest == bowl(objective.best)
+        assert objective.best == pytest.approx([0.7, -0.4], abs=0.05)
+        found.append(objective.best.tolist())
+    assert found[0] == found[1]
+    assert (found[0] == found[2]) == (name == "nelder_mead")
+
+
+def test_gains_are_tuned_by_a_swarm_too() -> None:
+    cases, start = [nominal(MODEL, QUIET)], {"controller": "pid", "kp": 60.0, "ki": 20.0}
+    runs = [
+        optimise(start, cases, [0.05], Criteria(), ["kp", "ki"], 0.8, 36, "particle_swarm", seed) for seed in (1, 1)
+    ]
+    assert runs[0] == runs[1] and runs[0].cost < 0.7 * runs[0].start_cost and runs[0].trials == 36
+    assert optimise(start, cases, [0.05], Criteria(), ["kp"], 0.8, 0).values == start
+
+
+@pytest.mark.parametrize("preset", ["moog_mcr_m_1002_bench", "festo_hanging_load"])
+def test_laws_begin_from_the_resonance_and_the_gain_of_any_cylinder(preset: str) -> None:
+    model = load_model(preset)
+    simple = simple_model(model, [])
+    assert simple.velocity_gain == pytest.approx(velocity_gain(model))
+    pair = min((p for p in poles(model) if p.imag > 0.0), key=abs)
+    assert simple.frequency == pytest.approx(abs(pair), rel=1e-6) and 0.0 < simple.damping < 0.2
+    chirp = from_coefficients([100.0], np.polymul([1.0, 0.0], [1.0, 2.0 * 0.2 * 60.0, 3600.0]), None)
+    assert simple_model(model, [chirp])[2:] == pytest.approx((60.0, 0.2))
 
 
 def test_criteria() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hydraulic_sim.errors import SimulationError
-from hydraulic_sim.linear import closed_form, linearise, operating_point
+from hydraulic_sim.linear import closed_form, linearise, operating_point, velocity_gain
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 
@@ -62,3 +62,23 @@ def test_unequal_areas_have_no_closed_form():
     model = load_model("moog_mcr_m_1002_bench").with_values({"piston_area_b": 5e-3})
     with pytest.raises(SimulationError, match="equal piston areas"):
         closed_form(model)
+
+
+@pytest.mark.parametrize("area", [8.0645e-3, 5e-3, 1.2e-2])
+def test_velocity_gain_is_the_speed_of_a_piston_of_any_areas(area):
+    model = load_model("moog_mcr_m_1002_bench").with_values({"piston_area_b": area, "valve_leakage": 0.0})
+    for effect in ("internal_leakage", "viscous_friction"):
+        model = model.without_effect(effect) if effect in model.effects else model
+    speeds = [abs(operating_point(model, drive=drive).velocity) for drive in (2.0, -2.0)]
+    assert velocity_gain(model) == pytest.approx(np.mean(speeds) / 2.0, rel=2e-3)
+
+
+def test_velocity_gain_of_an_axis_without_oil_is_that_of_its_drag(tmp_path):
+    known = {"moving_mass": "100 kg", "stroke": "1 m", "drive_limit": "10 V", "drive_force": "50 N/V"}
+    numbers = ", ".join(f"{name}: {{value: {value}}}" for name, value in known.items())
+    file = tmp_path / "axis.yaml"
+    file.write_text(f"format: hydraulic-model-1\nname: axis\nplant: mechanical\nparameters: {{{numbers}}}\n")
+    axis = load_model(file)
+    with pytest.raises(SimulationError, match="without viscous friction"):
+        velocity_gain(axis)
+    assert velocity_gain(axis.with_effect("viscous_friction", {"coefficient": 200.0})) == pytest.approx(0.25)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from end_stops import KINDS, MODELS, benches, ends_of_the_shipped_bench, impact, plant
+from end_stops import KINDS, LAWS, MODELS, Kind, benches, ends_of_the_shipped_bench, impact, plant
 from hydraulic_can_driver.bus_file import load_bus
 from hydraulic_plant_node.travel_limits import TravelLimits
 from hydraulic_sim.live import LivePlant
@@ -23,6 +23,19 @@ def test_a_bench_that_hardly_damps_the_swing_of_its_load_is_held_as_well() -> No
     bench = benches()["sample_bench"]
     speeds = [impact(seed, bench)[1] for seed in (2050, 2056, 2085, 2089, 2103, 2136, 2175)]
     assert max(speeds) <= bench.ends.impact_speed == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda kind: kind.__name__)
+def test_an_unstable_controller_meets_the_gate_not_the_stop(law: Kind) -> None:
+    bench = benches()["bus"]
+    speeds = [impact(seed, bench, seconds=1.0, kinds=(law,))[1] for seed in range(2)]
+    assert max(speeds) <= bench.ends.impact_speed == pytest.approx(0.05)
+
+
+def test_without_the_gate_unstable_controllers_meet_the_stop() -> None:
+    bench = benches()["bus"]
+    speeds = [impact(seed, bench, limited=False, seconds=1.0, kinds=LAWS)[1] for seed in range(20)]
+    assert sum(speed > 0.3 for speed in speeds) > 2
 
 
 def test_without_the_limits_the_same_streams_do() -> None:

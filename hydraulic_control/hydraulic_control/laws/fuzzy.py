@@ -6,10 +6,11 @@ with internal leakage, Mechatronics 19 (2009): 7 × 7 rules; here with Sugeno's 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from hydraulic_control.fuzzy_rules import SHAPE, drive_rules, inferred, scales
-from hydraulic_control.law import Law, SimpleModel, Values, fed_forward
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward
 from hydraulic_control.law_parts import end_integral
 
 
@@ -34,4 +35,14 @@ LAW = Law(
     design=drive_rules,
     tuned=("fuzzy.error", "fuzzy.rate", "fuzzy.output", "ki"),
     starts=starts,
+    claims=(
+        Claim(
+            "internal leakage matters to position control (Kalyoncu 2009)",
+            "leakage",
+            "steady_state_error",
+            over_trial="step",
+            low=1.5,
+            high=math.inf,
+        ),
+    ),
 )

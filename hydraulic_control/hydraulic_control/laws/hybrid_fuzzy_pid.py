@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from hydraulic_control.fuzzy_rules import SHAPE, drive_rules, inferred, scales
-from hydraulic_control.law import Law, SimpleModel, Values, fed_forward
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward
 from hydraulic_control.law_parts import end_integral
 
 
@@ -41,4 +41,12 @@ LAW = Law(
     tuned=("kp", "ki", "kd", "hybrid_fuzzy_pid.error", "hybrid_fuzzy_pid.output"),
     starts=starts,
     follows=("pid", as_is),
+    claims=(
+        Claim(
+            "better than PID under varying load and pressure (Ghazali 2014)",
+            "varying",
+            "rms_error",
+            over="pid",
+        ),
+    ),
 )

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hydraulic_control.law import Law, SimpleModel, Values, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, number
 from hydraulic_control.law_parts import integrate
 from hydraulic_node_utils.parameter_spec import ParameterSpec
 
@@ -90,4 +90,5 @@ LAW = Law(
     tuned=("model_inversion.feedback", "model_inversion.spread"),  # steps say little of the integral, which tracks
     starts=starts,
     needs="model file",
+    claims=(Claim("follows a sine with a third of the error of PID", "sine", "rms_error", over="pid", high=0.33),),
 )

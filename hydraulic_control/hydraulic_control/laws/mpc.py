@@ -14,7 +14,7 @@ import daqp
 import numpy as np
 from numba import objmode
 
-from hydraulic_control.law import Law, SimpleModel, Values, model_parameters, model_values, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, model_parameters, model_values, number
 from hydraulic_control.law_parts import end_observer
 
 _BLOCKS = (1, 2, 3, 5, 9)
@@ -112,4 +112,8 @@ LAW = Law(
     tuned=("mpc.period", "mpc.smoothness", "mpc.observer"),
     starts=starts,
     needs="identified model",
+    claims=(
+        Claim("at least as good as PFC without a disturbance (Liang 2019)", "sine", "rms_error", over="pfc", high=1.02),
+        Claim("at least as good as PFC with one (Liang 2019)", "load_step", "largest_error", over="pfc", high=1.02),
+    ),
 )

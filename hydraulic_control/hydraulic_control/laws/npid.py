@@ -14,7 +14,7 @@ from typing import Any
 
 from numba import njit
 
-from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward, number
 from hydraulic_control.law_parts import integrate
 
 _SHAPES = ({"k1": 3.0, "k2": 50.0}, {"k1": 0.3, "k2": 50.0})
@@ -69,4 +69,13 @@ LAW = Law(
     tuned=("kp", "ki", "kd", "k1", "k2"),
     starts=starts,
     follows=("pid", softened),
+    claims=(
+        Claim(
+            "a step settles within 3 s on the nonlinear plant (Nisar & Munawar)",
+            "step",
+            "settling_time",
+            high=3.0,
+        ),
+        Claim("its overshoot is 4.8 % at most (Nisar & Munawar)", "step", "overshoot", high=4.8),
+    ),
 )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from hydraulic_control.fuzzy_rules import SHAPE, drive_rules, inferred, scales
-from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward, number
 from hydraulic_control.law_parts import integrate, ramp
 
 
@@ -54,4 +54,5 @@ LAW = Law(
     tuned=("kp", "ki", "kd", "p_fuzzy_pid.error", "p_fuzzy_pid.near", "p_fuzzy_pid.far"),
     starts=starts,
     follows=("pid", around),
+    claims=(Claim("faster to the goal than PID (Wang 2009)", "step", "settling_time", over="pid"),),
 )

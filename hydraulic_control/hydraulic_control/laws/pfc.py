@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hydraulic_control.law import Law, SimpleModel, Values, model_parameters, model_values, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, model_parameters, model_values, number
 from hydraulic_control.law_parts import end_observer
 
 
@@ -58,4 +58,5 @@ LAW = Law(
     tuned=("pfc.response_time", "pfc.horizon", "pfc.observer"),
     starts=starts,
     needs="identified model",
+    claims=(Claim("follows better than PID tuned by a swarm (Izzuddin 2015)", "sine", "rms_error", over="pid"),),
 )

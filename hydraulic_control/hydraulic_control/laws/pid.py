@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_control.law import Law, SimpleModel, Values, fed_forward
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward
 from hydraulic_control.law_parts import end_integral
 
 
@@ -30,4 +30,13 @@ LAW = Law(
     parameters=(),
     tuned=("kp", "ki", "kd"),
     starts=starts,
+    claims=(
+        Claim(
+            "almost alike in simulation and on the machine (Rahmat 2010)",
+            "step",
+            "rise_time",
+            over="model",
+            high=1.15,
+        ),
+    ),
 )

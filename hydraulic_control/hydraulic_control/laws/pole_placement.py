@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from hydraulic_control.law import Law, SimpleModel, Values, model_parameters, model_values, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, model_parameters, model_values, number
 from hydraulic_control.law_parts import clamp
 from hydraulic_control.polynomials import design
 
@@ -70,4 +70,5 @@ LAW = Law(
     tuned=("pole_placement.frequency", "pole_placement.observer"),
     starts=starts,
     needs="identified model",
+    claims=(Claim("more accurate than PID (Ishak 2006)", "sine", "rms_error", over="pid"),),
 )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward, number
 from hydraulic_control.law_parts import at_limit, clamp, integrate, outside
 
 _CENTRES = 15  # over demanded speeds −1 … 1 of the scale, closer together around 0
@@ -69,4 +69,5 @@ LAW = Law(
     tuned=("kp", "ki", "kd", "rbf.rate"),
     starts=starts,
     follows=("pid", as_is),
+    claims=(Claim("robust to varying load and pressure, beside PID (Choi 2013)", "varying", "rms_error", over="pid"),),
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from hydraulic_control.fuzzy_rules import SHAPE, inferred, scales, table
-from hydraulic_control.law import Law, SimpleModel, Values, fed_forward, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward, number
 from hydraulic_control.law_parts import integrate
 
 _TABLES = ("proportional_gain", "integral_gain", "derivative_gain")
@@ -60,4 +60,5 @@ LAW = Law(
     tuned=("kp", "ki", "kd", "self_tuning_fuzzy_pid.error", "self_tuning_fuzzy_pid.span"),
     starts=starts,
     follows=("pid", as_is),
+    claims=(Claim("settles sooner than PID (Zulfatman & Rahmat 2009)", "step", "settling_time", over="pid"),),
 )

@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from hydraulic_control.comparison import Values, compare, shown
+from hydraulic_control.comparison import CLAIM_HEADS, Values, claim_cells, claims, compare, shown
 from hydraulic_control.simulation import SensorNoise
 from hydraulic_control.verbs._cells import finite
 from hydraulic_node_utils import cli, tables
@@ -32,11 +32,14 @@ def show_trials(
 
         write_text(path, page(document))
     if options.json:
-        print(json.dumps(finite(document), ensure_ascii=False))
+        print(json.dumps(finite({**document, "claims": claims(document)}), ensure_ascii=False))
         return
     out = tables.console(120)
     for trial, description in document["descriptions"].items():
         out.print(_trial_table(document, trial, description, options.sort))
+    rows = [claim_cells(row) for row in claims(document)]
+    if rows:
+        out.print(tables.table("what is published of these laws", CLAIM_HEADS, rows))
     if path:
         out.print(f"\n{path}")
 

@@ -20,6 +20,7 @@ from rich.console import Console
 from hydraulic_control import gains_file, tune_run
 from hydraulic_control.errors import ControlError
 from hydraulic_control.identified import load_identified
+from hydraulic_control.optimisers import OPTIMISERS
 from hydraulic_control.parameters import CONTROLLERS, SPECS
 from hydraulic_control.relay import CriticalPoint, RelaySettings
 from hydraulic_control.scenario import nominal, scattered
@@ -36,6 +37,7 @@ examples:
   python -m hydraulic_control tune --out runs/npid.yaml
   python -m hydraulic_control tune --identified runs/chirp/linear_model.json --rise 0.2 --out runs/npid.yaml
   python -m hydraulic_control tune --controller pid --trials 0 --relay runs/relay.json --out runs/pid.yaml
+  python -m hydraulic_control tune --controller fuzzy --optimiser particle_swarm --seed 1 --out runs/fuzzy.yaml
 """
 
 
@@ -54,6 +56,8 @@ def main(argv: list[str] | None = None) -> int:
         parser.add_argument(option, type=cli.positive, default=default, help=f"goal (default {default:g})")
     parser.add_argument("--plants", metavar="N", type=cli.count, default=5, help="scattered plants (default 5)")
     parser.add_argument("--trials", metavar="N", type=cli.count, default=300, help="0: best rule only (default 300)")
+    parser.add_argument("--optimiser", choices=tuple(OPTIMISERS), default="nelder_mead", help="(default nelder_mead)")
+    parser.add_argument("--seed", metavar="N", type=cli.count, default=0, help="of its chance (default 0)")
     parser.add_argument("--no-force-feedback", action="store_true", help="without dynamic pressure feedback")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="parameter file to write")
     parser.add_argument("--overwrite", action="store_true", help="replace what is at --out")
@@ -73,11 +77,11 @@ def _tune(options: argparse.Namespace) -> None:
     with console.status("critical points …"):
         found = tune_run.critical_points(model, models, noise, relay, measured)
         simple = tune_run.simple_model(model, models)
-        gains = tune_run.by_rule(found, *simple)
+        gains = tune_run.by_rule(found, simple.velocity_gain, simple.lag)
     with console.status(f"optimising {options.controller} …"):
         tuned = tune_run.tune(
             options.controller, model, models, gains, simple, options.steps, criteria, options.plants, options.trials,
-            noise, not options.no_force_feedback, _fixed(options),
+            noise, not options.no_force_feedback, _fixed(options), options.optimiser, options.seed,
         )  # fmt: skip
     path.write_text(gains_file.text(tuned.values, _remarks(options, tuned)), encoding="utf-8")
     if options.json:
@@ -111,7 +115,8 @@ def _remarks(options: argparse.Namespace, tuned: Tuned) -> str:
     steps = ", ".join(f"{1e3 * s:g}" for s in options.steps)
     return (
         f"Gains of {options.controller}, found by tune on {where};\nsteps of {steps} mm; goals: {goals} (SI, overshoot "
-        f"in %).\nCost {tuned.cost:.4g}, from {tuned.start_cost:.4g} by rule, after {tuned.trials} trials."
+        f"in %).\nCost {tuned.cost:.4g}, from {tuned.start_cost:.4g} by rule, after {tuned.trials} trials of "
+        f"{options.optimiser}, seed {options.seed}."
     )
 
 

@@ -140,9 +140,7 @@ def document(
         "grid": cells,
         "shapes": shapes_table(cells),
         "recorded": records_rmse({k: models[k] for k in study.KINDS}, recorded) if recorded else [],
-        "reviewed": [
-            {"authors": a, "excitation": e, "model": m, "best_fit": list(f)} for a, e, m, f in printed.REVIEWED
-        ],
+        "reviewed": [],
         "better": min((r for r in thesis if r["band"] == "in"), key=lambda r: r["rmse"])["excitation"],
         "printed": {"rmse_order": printed.RMSE_ORDER, "better": printed.BETTER},
         "left_out": list(printed.LEFT_OUT),

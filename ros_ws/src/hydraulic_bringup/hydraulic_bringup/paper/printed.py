@@ -13,11 +13,14 @@ BETTER = "chirp"
 """The excitation whose model shows the smaller RMSE, as its text says."""
 
 REVIEWED = (
-    ("Rahmat et al.", "multisine", "ARX, 4th order", (92.8,)),
-    ("Izzuddin et al.", "multisine, step", "ARX, 3rd order", (95.86, 94.67)),
-    ("Ishak et al.", "multisine", "ARX, 3rd order", (91.16,)),
+    ("Rahmat 2010", "multisine", "arx", 4, 92.8),
+    ("Izzuddin 2015", "multisine", "arx", 3, 95.86),
+    ("Izzuddin 2015", "step", "arx", 3, 94.67),
+    ("Ishak 2006", "multisine", "arx", 3, 91.16),
+    ("Wang 2009", "sine", "arx", 3, None),
+    ("Ren 2018", "chirp", "transfer_function", 4, None),
 )
-"""Works it compares itself with: authors, excitation, model, best fit [%]."""
+"""Works it compares itself with: authors, excitation, kind and order of the model, best fit [%] where there is one."""
 
 LEFT_OUT = (
     "The value of the bandwidth and its definition are not printed. Here: the closed position loop at half the "

@@ -31,9 +31,20 @@ def _models(result: dict[str, Any], console: Console) -> None:
             f"{r['mse_mm2']:.2g} ({r['printed_mse']:g})",
             f"{r['fpe_mm2']:.2g} ({r['printed_fpe']:g})",
         )
+    console.print(table)
+    _reviewed(result, console)
+
+
+def _reviewed(result: dict[str, Any], console: Console) -> None:
+    columns = ("work", "excitation", "model", ">best fit, second half", ">one step ahead", ">on the chirp")
+    table = tables.table("the works that it reviews, on this plant (their figures in brackets)", columns)
     for r in result["reviewed"]:
-        fits = ", ".join(f"{fit:g} %" for fit in r["best_fit"])
-        table.add_row(r["excitation"], f"{r['model']} ({r['authors']})", f"({fits})", "", "")
+        theirs = "–" if r["printed_best_fit"] is None else f"{r['printed_best_fit']:g} %"
+        ours = (
+            (r["why"], "", "") if r["why"] else map(_fit, (r["best_fit"], r["best_fit_one_step"], r["best_fit_chirp"]))
+        )
+        own, *others = ours
+        table.add_row(r["authors"], r["excitation"], r["model"], f"{own} ({theirs})", *others)
     console.print(table)
 
 

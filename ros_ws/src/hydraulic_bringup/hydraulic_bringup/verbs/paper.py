@@ -19,7 +19,7 @@ from rich.console import Console
 
 from hydraulic_bringup.demo import online
 from hydraulic_bringup.demo.errors import DemoError
-from hydraulic_bringup.paper import control, playing, study
+from hydraulic_bringup.paper import control, playing, reviewed, study
 from hydraulic_bringup.paper.document import document
 from hydraulic_bringup.paper.printing import show
 from hydraulic_bringup.verbs.demo import ProgressSteps, new_folder
@@ -86,11 +86,14 @@ def _run(options: argparse.Namespace) -> None:
         records = _play(options, model, live, out, steps)
         origins = {name: f"{options.plant} through the node graph" for name in records}
         steps.begin("rehearse on the model", 10.0)
-        rest = [plan for plan in [*plans, *extra] if plan.name not in records]
+        of_others = reviewed.plans(model, bandwidth.position)
+        rest = [plan for plan in [*plans, *extra, *of_others] if plan.name not in records]
         records |= playing.on_the_model(rest, model, steps)
         origins |= {plan.name: "rehearsed on the model" for plan in rest}
         steps.done()
         result = _analyse(model, bandwidth, made, extra, records, origins, out, steps)
+        by_kind = {one.kind: one.plan for one in made if one.band == "in"} | {plan.name: plan for plan in of_others}
+        result["reviewed"] = reviewed.table(by_kind, records)
         results.write_result(out, result)
         page = write_page(out, results.read_folder(out))
     show(result, console)
