@@ -128,8 +128,8 @@ def claims(document: Mapping[str, Any]) -> list[dict[str, Any]]:
     usual = "median" if document["plants"] else "nominal"
 
     def figure(trials: Mapping[str, Any] | None, trial: str, name: str, which: str = usual) -> float | None:
-        one = trials and trials.get(trial, {}).get(which)
-        return one and one[name]
+        one = trials.get(trial, {}).get(which) if trials else None
+        return None if one is None else float(one[name])
 
     rows = []
     for controller, found in document["controllers"].items():

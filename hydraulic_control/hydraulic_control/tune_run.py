@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from hydraulic_control import rules
@@ -96,11 +95,13 @@ def simple_model(model: Model, models: Sequence[IdentifiedModel]) -> SimpleModel
     return SimpleModel(gain, max(spool + 1.5e-3, 1e-3), *(resonance or (_STIFF, 1.0)))
 
 
-def _resonance(found: NDArray[np.complex128], highest: float) -> tuple[float, float] | None:
+def _resonance(found: NDArray[Any], highest: float) -> tuple[float, float] | None:
     """Frequency [rad/s] and damping of the slowest pair of poles that swings, below ``highest``."""
-    pairs = [p for p in found.tolist() if p.imag > 0.0 and abs(p) < 0.9 * highest and -p.real < 0.7 * abs(p)]
-    slowest = min(pairs, key=abs, default=None)
-    return slowest and (abs(slowest), max(-slowest.real / abs(slowest), 1e-3))
+    pairs = [p for p in map(complex, found) if p.imag > 0.0 and abs(p) < 0.9 * highest and -p.real < 0.7 * abs(p)]
+    if not pairs:
+        return None
+    slowest = min(pairs, key=abs)
+    return abs(slowest), max(-slowest.real / abs(slowest), 1e-3)
 
 
 def tune(
