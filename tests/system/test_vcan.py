@@ -32,7 +32,7 @@ SHIPPED = Path(__file__).parents[2] / "hydraulic_can_driver" / "hydraulic_can_dr
 CHANNEL = "vcanbench"
 RATE = 2.5  # the drive is sent a quarter of the period before its SYNC, and the loop wakes up to 50 ms late
 SHORTEST = 5  # samples of a piece of the record between two lost ones
-DURATION = 36.0  # of the excitation, s
+DURATION = 24.0  # of the excitation, s
 PATIENCE_S = 10.0
 MACHINE_S = 900.0  # a machine that is busy besides; with two free processors it takes a minute
 
