@@ -62,21 +62,26 @@ def broken(model: Model) -> Plant:
 
 
 def test_simulation_releases_the_interpreter(everything: Model) -> None:
-    """Python code goes on while a plant is simulated in another thread."""
-    plant, counted = Plant(everything), 0
-    done = threading.Event()
+    """Python code goes on while a plant is simulated in another thread, which would never be made to give way."""
+    plant, drives, counted = Plant(everything), drive(60_000), 0
+    enough, done = threading.Event(), threading.Event()
 
     def work() -> None:
-        plant.simulate(drive(60_000), DT)
+        for _ in range(100):  # nothing but the simulation gives way in here
+            plant.simulate(drives, DT)
+            if enough.is_set():
+                break
         done.set()
 
     before = sys.getswitchinterval()
+    sys.setswitchinterval(1000.0)
     thread = threading.Thread(target=work)
     thread.start()
     try:
-        while not done.wait(0.001):
+        while counted < 3 and not done.wait(0.001):
             counted += 1
     finally:
+        enough.set()
         thread.join()
         sys.setswitchinterval(before)
     assert counted >= 3
