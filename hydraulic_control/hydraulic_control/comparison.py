@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hydraulic_control.law import MODEL, Claim
 from hydraulic_control.laws import laws
 from hydraulic_control.response import Response, step_figures, tracking_figures
 from hydraulic_control.scenario import scattered_models
@@ -36,8 +37,6 @@ SAME = 0.02
 _OVERSHOOT = 25.0  # %, from which a loop is called unsteady
 
 Values = Mapping[str, Any]
-MODEL = "model"
-"""What a claim names that compares a law's worst plant with the model."""
 
 
 def figures(trial: Trial, response: Response) -> dict[str, float] | None:
@@ -121,8 +120,9 @@ def delay_margin(values: Values, model: Model, size: float) -> float:
 def claims(document: Mapping[str, Any]) -> list[dict[str, Any]]:
     """What is published of the laws beside what was measured: a row for each claim of each controller.
 
-    Of the scattered copies the median counts, where there are any; else the model. ``measured`` is None and ``holds``
-    too where a law that it takes was not tried or ran away.
+    Of the scattered copies the median counts, where there are any; else the model. Where a law that it takes was not
+    tried or ran away, ``measured`` and ``holds`` are None. ``verdict`` says it in words, and where two laws are alike.
+    Of several controllers of one law the last is the one that others are compared with.
     """
     of_law = {laws()[found["values"]["controller"]].name: found["trials"] for found in document["controllers"].values()}
     usual = "median" if document["plants"] else "nominal"
@@ -144,8 +144,17 @@ def claims(document: Mapping[str, Any]) -> list[dict[str, Any]]:
                 below = figure(of_law.get(claim.over) if claim.over else trials, beside, claim.figure)
             measured = above / below if above is not None and below else None
             holds = None if measured is None else claim.low <= measured <= claim.high
-            rows.append({"controller": controller, **asdict(claim), "measured": measured, "holds": holds})
+            found_so = {"measured": measured, "holds": holds, "verdict": _verdict(claim, measured, holds)}
+            rows.append({"controller": controller, **asdict(claim), **found_so})
     return rows
+
+
+def _verdict(claim: Claim, measured: float | None, holds: bool | None) -> str:
+    if measured is None:
+        return "not tried"
+    if claim.over and abs(measured / claim.high - 1.0) < SAME:
+        return "no difference"
+    return "holds" if holds else "does not hold"
 
 
 CLAIM_HEADS = ("controller", "published", "measured here", "figure", "claim", "verdict")
@@ -153,16 +162,16 @@ CLAIM_HEADS = ("controller", "published", "measured here", "figure", "claim", "v
 
 def claim_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     """A row of `claims` for a table: controller, claim, what is measured, the figure, what the claim asks, verdict."""
-    over = {"": f" over that of {row['over_trial']}", MODEL: ", worst copy over the model"}
     what = f"{row['figure'].replace('_', ' ')}, {row['trial']}"
-    if row["over"] or row["over_trial"]:
-        what += over.get(row["over"], f", over that of {row['over']}")
+    if row["over"] == MODEL:
+        what += ", worst copy over the model"
+    elif row["over"]:
+        what += f", over that of {row['over']}"
+    elif row["over_trial"]:
+        what += f" over that of {row['over_trial']}"
     asked = f"≥ {row['low']:g}" if math.isinf(row["high"]) else f"≤ {row['high']:g}"
     measured = "–" if row["measured"] is None else f"{row['measured']:.2g}"
-    verdict = {None: "not tried", True: "holds", False: "does not hold"}[row["holds"]]
-    if row["over"] and row["measured"] is not None and abs(row["measured"] / row["high"] - 1.0) < SAME:
-        verdict = "no difference"
-    return row["controller"], row["text"], what, measured, asked, verdict
+    return row["controller"], row["text"], what, measured, asked, row["verdict"]
 
 
 def shown(document: Mapping[str, Any], trial: str) -> list[tuple[str, str, float, int]]:

@@ -44,13 +44,17 @@ def same(values: Values) -> dict[str, Any]:
     return {}
 
 
+MODEL = "model"
+"""What a claim names that compares a law's worst plant with the model, not with another law."""
+
+
 @dataclass(frozen=True)
 class Claim:
     """What a publication says of its law, as a ratio that can be measured; a value where nothing divides it.
 
     :param text: the claim, and whose it is
     :param trial: what the law is tried on (`trials.TRIALS`), ``figure`` what is read there (`response`)
-    :param over: the law that it is compared with, on the same trial; "model": its worst plant with the model
+    :param over: the law that it is compared with, on the same trial; `MODEL`: its worst plant with the model
     :param over_trial: the trial that it is compared with, of the same law
     :param low: the claim holds from here …
     :param high: … to here

@@ -91,8 +91,9 @@ def simple_model(model: Model, models: Sequence[IdentifiedModel]) -> SimpleModel
     spool = 0.0
     if "spool_dynamics" in model.effects:
         spool = 2.0 * model.value("spool_dynamics.damping") / (6.283185 * model.value("spool_dynamics.frequency"))
-    resonance = (models and _resonance(models[0].poles, models[0].highest)) or _resonance(poles(model), math.inf)
-    return SimpleModel(gain, max(spool + 1.5e-3, 1e-3), *(resonance or (_STIFF, 1.0)))
+    resonance = _resonance(models[0].poles, models[0].highest) if models else None
+    resonance = resonance or _resonance(poles(model), math.inf) or (_STIFF, 1.0)
+    return SimpleModel(gain, max(spool + 1.5e-3, 1e-3), *resonance)
 
 
 def _resonance(found: NDArray[Any], highest: float) -> tuple[float, float] | None:

@@ -152,7 +152,7 @@ def closed_form(model: Model) -> ClosedForm:
         return model.value(f"{effect}.{name}") if effect in model.effects else 0.0
 
     half_drop = 0.5 * (model.value("supply_pressure") - model.value("tank_pressure"))
-    land = model.value("valve_flow") / math.sqrt(model.value("valve_drop"))
+    land = _land(model)
     flow_gain = land * math.sqrt(half_drop) / model.value("drive_limit")
     flow_pressure = land * model.value("valve_leakage") / (2.0 * math.sqrt(half_drop))
     volume = area * model.value("stroke") + model.value("dead_volume_a") + model.value("dead_volume_b")
@@ -184,7 +184,7 @@ def velocity_gain(model: Model) -> float:
         if not drag > 0.0:
             raise SimulationError(f"{model.name}: a mechanical axis without viscous friction has no velocity gain")
         return abs(model.value("drive_force")) / drag
-    land = model.value("valve_flow") / math.sqrt(model.value("valve_drop")) / model.value("drive_limit")
+    land = _land(model) / model.value("drive_limit")
     supply, tank = model.value("supply_pressure"), model.value("tank_pressure")
     areas = model.value("piston_area_a"), model.value("piston_area_b")
     speeds = [
@@ -192,6 +192,11 @@ def velocity_gain(model: Model) -> float:
         for into, out in (areas, areas[::-1])
     ]
     return 0.5 * sum(speeds)
+
+
+def _land(model: Model) -> float:
+    """Flow of a fully open land over the root of its pressure drop [m³/(s·√Pa)]."""
+    return model.value("valve_flow") / math.sqrt(model.value("valve_drop"))
 
 
 def _smooth_plant(model: Model) -> tuple[Plant, dict[str, int]]:

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from hydraulic_control.errors import ControlError
-from hydraulic_control.law import Claim, Law, SimpleModel, Values, model_parameters, model_values, number
+from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward, model_parameters, model_values, number
 from hydraulic_control.law_parts import integrate
 
 _MOST = 0.5  # of the loop's gain at the resonance: 6 dB
@@ -39,11 +39,6 @@ def derived(values: Values) -> dict[str, float]:
     return {"gain": gain, "slow_gain": gain * crossing / own["integral_ratio"]}
 
 
-def begin(p: Any, s: Any, position: float) -> None:
-    """Nothing filtered yet: the law joins on to the drive that there is."""
-    s.first = s.second = 0.0
-
-
 def drive(p: Any, s: Any, dt: float, reference: float, reference_velocity: float, position: float) -> float:
     """The filtered error and its integral."""
     share = dt * p.rolloff * p.bandwidth / (1.0 + dt * p.rolloff * p.bandwidth)
@@ -63,15 +58,14 @@ def starts(simple: SimpleModel, gains: list[Values]) -> list[dict[str, Any]]:
         **model_values("low_bandwidth", simple),
         "low_bandwidth.frequency": simple.frequency,
         "low_bandwidth.damping": simple.damping,
-        "velocity_feedforward": 1.0 / simple.velocity_gain,
     }
-    return [{**model, "low_bandwidth.bandwidth": part * simple.frequency} for part in (0.02, 0.05, 0.1)]
+    bandwidths = (part * simple.frequency for part in (0.02, 0.05, 0.1))
+    return fed_forward(simple, ({**model, "low_bandwidth.bandwidth": w} for w in bandwidths))
 
 
 LAW = Law(
     description="low-bandwidth loop on a fourth-order model",
     source="Ren 2018",
-    begin=begin,
     drive=drive,
     end=end,
     parameters=(

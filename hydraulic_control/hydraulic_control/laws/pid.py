@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hydraulic_control.law import Claim, Law, SimpleModel, Values, fed_forward
+from hydraulic_control.law import MODEL, Claim, Law, SimpleModel, Values, fed_forward
 from hydraulic_control.law_parts import end_integral
 
 
@@ -35,7 +35,7 @@ LAW = Law(
             "almost alike in simulation and on the machine (Rahmat 2010)",
             "step",
             "rise_time",
-            over="model",
+            over=MODEL,
             high=1.15,
         ),
     ),

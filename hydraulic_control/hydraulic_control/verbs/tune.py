@@ -56,7 +56,9 @@ def main(argv: list[str] | None = None) -> int:
         parser.add_argument(option, type=cli.positive, default=default, help=f"goal (default {default:g})")
     parser.add_argument("--plants", metavar="N", type=cli.count, default=5, help="scattered plants (default 5)")
     parser.add_argument("--trials", metavar="N", type=cli.count, default=300, help="0: best rule only (default 300)")
-    parser.add_argument("--optimiser", choices=tuple(OPTIMISERS), default="nelder_mead", help="(default nelder_mead)")
+    parser.add_argument(
+        "--optimiser", choices=tuple(OPTIMISERS), default="nelder_mead", help="way to search (default nelder_mead)"
+    )
     parser.add_argument("--seed", metavar="N", type=cli.count, default=0, help="of its chance (default 0)")
     parser.add_argument("--no-force-feedback", action="store_true", help="without dynamic pressure feedback")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="parameter file to write")
