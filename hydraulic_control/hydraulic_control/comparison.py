@@ -16,6 +16,7 @@ from hydraulic_control.response import Response, step_figures, tracking_figures
 from hydraulic_control.scenario import scattered_models
 from hydraulic_control.simulation import QUIET, SensorNoise
 from hydraulic_control.trials import TRIALS, Trial, trials_of
+from hydraulic_node_utils import processors
 from hydraulic_sim.model import Model
 
 COLUMNS = (
@@ -64,7 +65,7 @@ def compare(
     results: dict[str, dict[str, Any]] = {}
     for controller, values in controllers.items():
         say(controller)
-        with ThreadPoolExecutor() as pool:
+        with ThreadPoolExecutor(processors.usable()) as pool:
             jobs = {
                 name: [
                     pool.submit(trial.response, values, one, size, noise, seed + i)

@@ -17,6 +17,7 @@ from hydraulic_control.parameters import SPECS
 from hydraulic_control.response import Response, StepFigures, step_figures
 from hydraulic_control.scenario import Case
 from hydraulic_control.simulation import BEGIN_S, run, step_reference
+from hydraulic_node_utils import processors
 
 FORCE = "force_feedback"
 """Tuned of every law, beside what the law names."""
@@ -103,7 +104,7 @@ def cost_of(
 ) -> float:
     """Cost of these values over all plants, of which the first is the model as it is, and steps [m]."""
     Controller(values)  # refuses values that are not allowed, and is compiled once, before the threads
-    with ThreadPoolExecutor() as pool:
+    with ThreadPoolExecutor(processors.usable()) as pool:
         tried = [[pool.submit(try_step, values, case, step, duration) for case in cases] for step in steps]
     costs = []
     for step, responses in zip(steps, tried, strict=True):

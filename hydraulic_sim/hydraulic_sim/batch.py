@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from hydraulic_node_utils import processors
 
 from .errors import ModelError
 from .model import Model
@@ -32,7 +33,7 @@ def simulate_batch(jobs: Sequence[Job], workers: int | None = None) -> list[Traj
 
     :raises SimulationError: a job fails; the first error is raised.
     """
-    count = workers or os.cpu_count() or 1
+    count = workers or processors.usable()
     if count == 1 or len(jobs) < 2:
         return [_run(job) for job in jobs]
     with ThreadPoolExecutor(max_workers=min(count, len(jobs))) as pool:

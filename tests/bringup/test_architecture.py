@@ -31,6 +31,7 @@ BELOW["hydraulic_bringup"] = set(BELOW)
 WINGS_BELOW: dict[str, set[str]] = {
     "data": set(),
     "estimation": {"data"},
+    "campaign": {"data"},
     "excitation": {"data", "estimation"},
     "linear": {"data", "estimation", "excitation"},
     "diagnosis": {"data", "estimation", "excitation", "linear"},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from hydraulic_node_utils import processors
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import Plant
@@ -170,7 +170,7 @@ class Shooting:
         return columns
 
     def _map(self, function: Callable[..., T], items: Iterable) -> list[T]:
-        return list(_workers(os.cpu_count() or 1).map(function, items))
+        return list(_workers(processors.usable()).map(function, items))
 
     def _residual(self, plant: Plant, i: int, states: Array, inner: Inner | None = None) -> Array:
         segments = self.segments[i]

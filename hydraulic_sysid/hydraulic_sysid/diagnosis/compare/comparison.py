@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
+from hydraulic_node_utils import processors
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import TITLES, number, percent
@@ -92,7 +92,7 @@ def _run_all(
             progress(records[index].name)
         return run(model, plant, records[index], horizon, seed=index)
 
-    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+    with ThreadPoolExecutor(max_workers=processors.usable()) as pool:
         return list(pool.map(one, range(len(records))))
 
 

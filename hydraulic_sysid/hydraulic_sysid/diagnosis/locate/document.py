@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import reduce
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hydraulic_node_utils import processors
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
@@ -40,7 +40,7 @@ def balance_figures(model: Model, records: Sequence[Record]) -> list[dict[str, A
     if not names:
         return []
     balances = Balances(model, spool_measured="spool" in names)
-    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+    with ThreadPoolExecutor(max_workers=processors.usable()) as pool:
         return balance_entries(_studied(pool, balances, records, names, ()), names, maps=False)
 
 
@@ -63,7 +63,7 @@ def locate(
     lines: list[float] = []
     if names:
         balances = Balances(model, spool_measured="spool" in names)
-        with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        with ThreadPoolExecutor(max_workers=processors.usable()) as pool:
             studied = _studied(pool, balances, records, names, keys, progress)
             lines = common_lines([s.own.white for s in studied], studied[0].rate)
             found = _attributed(balances, studied, keys, lines, pool)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
+from hydraulic_node_utils import processors
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sysid.excitation.amplitude import Limits
 
@@ -61,7 +61,7 @@ class MovementSearch:
         """
         allowed: list[tuple[Movement, str]] = []
         found: list[JudgedMovement] = []
-        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        with ThreadPoolExecutor(processors.usable()) as pool:
             say("movements within the limits")
             for one in pool.map(self.within, every()):
                 if one is not None and not any(one[0].like(other) for other, _ in allowed):
@@ -84,7 +84,7 @@ class MovementSearch:
         old = replace(self, points=self.points[:points])
         keep = sorted(found, key=lambda c: -old.score([c]))[:_KEPT]
         say("the most telling movements once more")
-        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        with ThreadPoolExecutor(processors.usable()) as pool:
             judged = pool.map(lambda c: self.judged(c.movement, c.limited_by), keep)
             return [one for one in judged if one is not None]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from hydraulic_node_utils import processors
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import Fit, FitSettings, fit_segments
@@ -103,7 +103,7 @@ def refits(
         return fit_segments(point.plant, cuts, keys, FitSettings(length=length, most_steps=_MOST_STEPS))
 
     own = {t: fitted(t, records[t], ()).cost for t in {t for t, _ in chosen}}
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(processors.usable()) as pool:
         done = list(pool.map(lambda pair: fitted(pair[1], records[pair[0]], points[pair[1]].parameters.keys), chosen))
     return [_refit(pair, fit, own[pair[0]], records[pair[0]]) for pair, fit in zip(chosen, done, strict=True)]
 

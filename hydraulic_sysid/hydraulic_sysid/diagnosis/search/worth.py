@@ -103,15 +103,22 @@ def leaves_most(before: Misfit, after: Misfit) -> bool:
     return before.little and after.variance - 1.0 > SMALL_UNEXPLAINED * (before.variance - 1.0)
 
 
+def nothing_gained(before: Misfit, after: Misfit) -> bool:
+    """Whether nothing was left before, and effects take nothing off what noise leaves."""
+    gained = before.rms_validation**2 - after.rms_validation**2
+    return before.variance - 1.0 < NOTHING_LEFT and gained < NOTHING_LEFT
+
+
 def decisive(found: SearchResult) -> SearchResult:
     """A search without the effects that its data do not name.
 
-    None where so little was left that nothing need be missing, and they leave much of that; no further one without
-    which nothing is left either, and none that explains little and may as well be something of another subsystem: that
-    is how far laws are off those of the bench.
+    None where nothing was left before and they take nothing off it (a converter's steps, whose size every record
+    shows, below its noise), or so little was left that nothing need be missing and they leave much of that; no
+    further one without which nothing is left either, and none that explains little and may as well be something of
+    another subsystem: that is how far laws are off those of the bench.
     """
     base, final = found.base.misfit, found.final.misfit
-    if found.added and leaves_most(base, final):
+    if found.added and (nothing_gained(base, final) or leaves_most(base, final)):
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
         if needless(found, name) or vague(found, name):

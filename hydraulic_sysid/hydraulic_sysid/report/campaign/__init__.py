@@ -1,0 +1,3 @@
+"""Campaign: many cases of one verb."""
+
+SCHEMA = "hydraulic_sysid.campaign/1"
