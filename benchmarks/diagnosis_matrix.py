@@ -7,8 +7,9 @@ The first runs N benches (per seed) of the family: geometry, sensors, loop and d
 effect, a wrong number or a fault of the recording hidden (--what none|effect|datum|recording: that alone). The second
 runs the sample benches. Figures that are published come from seeds that nothing was chosen on.
 
-Benches come from the independent plant in hidden_effects/. Each bench's outcome is kept as one JSON document in the
-folder --out, and a run continues where it was ended. With --write FOLDER the benches themselves are written (records,
+Benches come from the independent plant in hidden_effects/. The run is a campaign: each bench's outcome is kept in the
+folder --out, a run continues where it was ended, and --scheduler takes the workers of a Dask cluster (which must find
+benchmarks/ on their PYTHONPATH). With --write FOLDER the benches themselves are written (records,
 the user's model file, the answer), nothing is diagnosed, and one of them can be looked at alone:
 
     ./bench shell -- python benchmarks/diagnosis_matrix.py --family --count 20 --seed 7 --write F
@@ -25,6 +26,7 @@ import sys
 from pathlib import Path
 
 from hidden_effects import benches, family, matrix
+from hydraulic_sysid import campaign
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "diagnosis-matrix.md"
@@ -40,9 +42,10 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--kind", choices=tuple(matrix.HIDDEN))
     parser.add_argument("--severity", choices=benches.SEVERITIES)
     parser.add_argument("--seed", nargs="+", type=int, default=[], metavar="S", help="benches alike, of other seeds")
-    parser.add_argument("--processes", type=int, default=2)
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--processes", type=int, metavar="N", help="default: one for each processor")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
     parser.add_argument("--out", type=Path, default=OUT, help="folder of the outcomes")
-    parser.add_argument("--again", action="store_true", help="examine benches again that were examined before")
     parser.add_argument("--no-reference", action="store_true", help="skip the refits of the true structures (faster)")
     parser.add_argument("--report-only", action="store_true", help="examine nothing, report what is in the folder")
     parser.add_argument("--doc", action="store_true", help=f"write {PAGE.relative_to(ROOT)}")
@@ -57,16 +60,15 @@ def main(argv: list[str] | None = None) -> int:
         for bench in chosen:
             print(benches.write(bench, options.write))
         return 0
-    if not options.report_only:
-        reference = not (options.no_reference or options.family)
-        matrix.run(chosen, options.out, options.processes, options.again, reference)
-    found = matrix.gather(chosen, options.out)
+    if options.report_only:
+        names = {b.name for b in chosen}
+        found = [d for d in matrix.kept(options.out) if d["answer"]["name"] in names]
+    else:
+        crew = campaign.dask_cluster(options.scheduler) if options.scheduler else campaign.processes(options.processes)
+        found = matrix.run(chosen, options.out, crew, not (options.no_reference or options.family))
     if not found:
         print("nothing was examined yet")
         return 1
-    stale = {d["version"] for d in found} - {matrix.version()}
-    if stale:
-        print(f"{sum(d['version'] in stale for d in found)} outcomes are of another state of the code (--again)")
     by_setting = matrix.setting_rows(found) if options.family else []
     print("\n".join([*matrix.rate_rows(found), "", *by_setting, "", *matrix.confusion_rows(found)]))
     if options.doc:

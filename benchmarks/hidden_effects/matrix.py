@@ -1,7 +1,4 @@
-"""Runs the diagnosis over the catalogue of hidden effects and gathers the confusion matrix.
-
-One JSON document per bench, so that a run can be continued and parts of it be repeated.
-"""
+"""The diagnosis over the benches with hidden effects as a campaign, and its confusion matrix."""
 
 from __future__ import annotations
 
@@ -13,10 +10,11 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+
+from hydraulic_sysid import campaign
+from hydraulic_sysid.campaign.outcome import CASES
 
 from . import benches, catalogue, family, scoring
 
@@ -129,39 +127,43 @@ def narrowed(
     ]
 
 
-def run(
-    chosen: list[benches.Bench], folder: Path, processes: int = 2, again: bool = False, reference: bool = True
-) -> None:
-    """Examine benches, in parallel, those not yet in ``folder`` (or all, ``again``); print each as it is done.
+def run(chosen: list[benches.Bench], folder: Path, crew: campaign.Crew, reference: bool = True) -> list[dict[str, Any]]:
+    """What is found for these benches, examined unless the folder has it of this state of the code; judged anew.
 
     The order is a shuffled one, so that a run that is ended early has seen a fair part of the catalogue.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    todo = [b for b in chosen if again or not (folder / f"{b.name}.json").exists()]
-    todo.sort(key=lambda b: hashlib.sha256(b.name.encode()).digest())
-    print(f"{len(chosen)} benches, {len(todo)} to do, {processes} processes", flush=True)
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        jobs = {pool.submit(examine, b, reference): b for b in todo}
-        for done in as_completed(jobs):
-            found = done.result()
-            name = jobs[done].name
-            part = folder / f"{name}.json.part"
-            part.write_text(json.dumps(found, indent=1) + "\n")
-            part.replace(folder / f"{name}.json")
-            marks = found["marks"]
-            right = "right" if _right(found) else "WRONG"
-            print(f"{found['cpu_seconds']:6.1f} s  {right}  {name:70s} {answered(marks)}", flush=True)
+    now = version()
+    cases = [
+        campaign.Case(campaign.digest([b.name, now, reference]), {"bench": b.name}, (b, reference)) for b in chosen
+    ]
+    shuffled = sorted(cases, key=lambda case: case.key)
+    outcomes = {o.key: o for o in campaign.run(examined, shuffled, folder, crew, _told)}
+    lost = [o for o in outcomes.values() if o.failed]
+    for outcome in lost:
+        print(f"no outcome: {outcome.labels['bench']}: {outcome.error}")
+    found = ((outcomes[case.key], b) for case, b in zip(cases, chosen, strict=True))
+    return [_judged(dict(outcome.row), b.answer()) for outcome, b in found if not outcome.failed]
 
 
-def gather(chosen: list[benches.Bench], folder: Path) -> list[dict[str, Any]]:
-    """What was found for these benches, as far as it is there; judged anew from the kept results."""
-    paths = ((folder / f"{b.name}.json", b.answer()) for b in chosen)
-    return [_judged(json.loads(path.read_text()), answer) for path, answer in paths if path.exists()]
+def examined(argument: tuple[benches.Bench, bool], place: Path) -> dict[str, Any]:
+    """The work of the campaign."""
+    return examine(*argument)
+
+
+def _told(progress: campaign.Progress) -> None:
+    if progress.last is None:
+        print(f"{progress.total} benches, {progress.total - progress.before} to do", flush=True)
+    elif not progress.last.failed:
+        found = progress.last.row
+        right = "right" if _right(found) else "WRONG"
+        said, name = answered(found["marks"]), progress.last.labels["bench"]
+        print(f"{found['cpu_seconds']:6.1f} s  {right}  {name:70s} {said}", flush=True)
 
 
 def kept(folder: Path) -> list[dict[str, Any]]:
     """All that was found in the present state of the code, judged anew."""
-    found = [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
+    outcomes = (json.loads(path.read_text()) for path in sorted((folder / CASES).glob("*.json")))
+    found = [o["row"] for o in outcomes if o["state"] == "done"]
     now = version()
     return [_judged(d, d["answer"]) for d in found if d["version"] == now]
 

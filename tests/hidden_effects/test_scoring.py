@@ -99,4 +99,4 @@ def test_selection_and_page(tmp_path):
     page = matrix.document([outcome])
     assert "benchmarks/diagnosis_matrix.py --doc" in page and "| valve_deadband | 1 | valve_deadband |" in page
     assert "| one hidden effect: right name first | ≥ 92 % | 1/1 = 100 % | 21…100 % |" in page
-    assert matrix.gather([bench], tmp_path) == []
+    assert matrix.kept(tmp_path) == []
