@@ -6,7 +6,8 @@ from . import slots
 from .effect import Effect
 from .registry import Library
 
-_EFFECT = ("name", "summary", "slot", "always_on", "equation", "source", "excited_by", "distinguished_by", "memory")
+_EFFECT = ("name", "summary", "slot", "always_on", "equation", "source", "excited_by", "distinguished_by", "wear",
+           "memory")  # fmt: skip
 _PARAMETER = ("name", "unit", "default", "null", "free", "description", "source")
 
 

@@ -88,7 +88,8 @@ class Effect:
     (for a relaxation state two: its rate and its target). ``memory`` is the number of values kept between samples.
     ``order`` sorts effects within a slot. ``step_rate`` estimates the fastest rate [1/s] that the effect brings, from
     parameters alone, so that the integrator's step can follow it; ``reach`` says how far back [s] its memory must go
-    (one value per sample; without it the memory may keep what is long past). ``always_on`` marks base physics.
+    (one value per sample; without it the memory may keep what is long past). ``always_on`` marks base physics. ``wear``
+    says what of a machine ages where the effect grows; empty where nothing does.
     ``alike_without_pressures`` names the family whose members drive and position alone cannot distinguish.
     """
 
@@ -110,6 +111,7 @@ class Effect:
     step_rate: Callable | None = None
     reach: Callable | None = None
     always_on: bool = False
+    wear: str = ""
     name: str = ""
 
     def __post_init__(self) -> None:

@@ -35,6 +35,7 @@ WINGS_BELOW: dict[str, set[str]] = {
     "excitation": {"data", "estimation"},
     "linear": {"data", "estimation", "excitation"},
     "diagnosis": {"data", "estimation", "excitation", "linear"},
+    "monitoring": {"data", "campaign", "estimation", "excitation", "linear", "diagnosis"},
     "report": {"data"},
 }
 WINGS_BELOW["verbs"] = WINGS_BELOW["nodes"] = set(WINGS_BELOW)

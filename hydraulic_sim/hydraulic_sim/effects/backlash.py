@@ -66,4 +66,5 @@ EFFECT = Effect(
     alike_without_pressures="sticking",
     distinguished_by="a width that does not depend on speed",
     step_rate=rate,
+    wear="rod eyes, pins, bearings",
 )

@@ -31,4 +31,5 @@ EFFECT = Effect(
     alike_without_pressures="sticking",
     distinguished_by="slow triangle: load pressure builds up while stuck",
     step_rate=lambda p: dry_friction_rate(p["level"], p),
+    wear="seals and guides",
 )

@@ -50,4 +50,5 @@ EFFECT = Effect(
     excited_by="resonance at several mean pressures, large pressure swings",
     confused_with=("hose_compliance", "structural_flexibility"),
     distinguished_by="resonance over mean pressure",
+    wear="air in the oil: suction line, low tank",
 )

@@ -28,4 +28,5 @@ EFFECT = Effect(
     confused_with=("supply_droop", "valve_null_bias"),
     distinguished_by="common mode p_A + p_B",
     step_rate=lambda p: 2.0 * p["coefficient"] * p["bulk_modulus"] / min(p["dead_volume_a"], p["dead_volume_b"]),
+    wear="rod seal, hoses, fittings",
 )

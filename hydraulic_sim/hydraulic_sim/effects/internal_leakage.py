@@ -28,4 +28,5 @@ EFFECT = Effect(
     alike_without_pressures="damping",
     distinguished_by="flow balance, not force balance",
     step_rate=lambda p: 2.0 * p["coefficient"] * p["bulk_modulus"] / min(p["dead_volume_a"], p["dead_volume_b"]),
+    wear="piston seal",
 )

@@ -27,4 +27,5 @@ EFFECT = Effect(
     excited_by="rest with equal pressures",
     confused_with=("constant_load",),
     distinguished_by="equal pressures at rest",
+    wear="pressure transducers",
 )

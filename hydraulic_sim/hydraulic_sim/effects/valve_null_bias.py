@@ -27,4 +27,5 @@ EFFECT = Effect(
     alike_without_pressures="offset",
     distinguished_by="load pressure at rest",
     order=10,
+    wear="null of the valve's first stage",
 )

@@ -27,4 +27,5 @@ EFFECT = Effect(
     alike_without_pressures="damping",
     distinguished_by="force balance, not flow balance",
     step_rate=lambda p: p["coefficient"] / p["moving_mass"],
+    wear="the oil's viscosity, guides",
 )

@@ -60,8 +60,11 @@ def _whole(record: dict) -> None:
         ("source", "source"),
         ("excited by", "excited_by"),
         ("distinguished by", "distinguished_by"),
+        ("grows with wear of", "wear"),
         ("file", "file"),
     ):
+        if not record[key]:
+            continue
         console.print(f"  {label}: {record[key]}", markup=False)
     console.print(f"  easily taken for: {', '.join(record['confused_with']) or 'nothing'}", markup=False)
     table = Table()

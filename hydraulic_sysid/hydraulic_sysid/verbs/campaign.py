@@ -29,6 +29,7 @@ from hydraulic_sysid.campaign.document import document
 from hydraulic_sysid.campaign.manifest import model_files, record_groups, variations
 from hydraulic_sysid.campaign.table import FORMATS, write_table
 from hydraulic_sysid.data import results
+from hydraulic_sysid.verbs._campaign_options import add_crew_options, chosen_crew
 
 EPILOG = """\
 examples:
@@ -53,9 +54,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--figures", metavar="COLUMN", nargs="+", default=[], help="columns whose distributions to show"
     )
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument("--workers", metavar="N", type=int, help="processes (default: one for each processor)")
-    where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
+    add_crew_options(parser)
     parser.add_argument("--again", action="store_true", help="do cases once more that failed")
     parser.add_argument("--table", choices=FORMATS, default=FORMATS[0], help="format of the table (default csv)")
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results")
@@ -64,14 +63,12 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _campaign(options: argparse.Namespace) -> int:
-    if options.workers is not None and options.workers < 1:
-        raise cli.UsageError(f"--workers is {options.workers}; allowed is 1 or more")
     manifest = _manifest(options)
     results.check_target(options.out, "campaign")
     cases = campaign.verb_cases(manifest)
     for file in manifest.models.values():
         Plant(load_model(file))  # compiled once, before the workers start
-    crew = campaign.dask_cluster(options.scheduler) if options.scheduler else campaign.processes(options.workers)
+    crew = chosen_crew(options)
     begun = time.monotonic()
     with ProgressLine(len(cases)) as line:
         outcomes = campaign.run(campaign.work, cases, options.out.resolve(), crew, line.told, options.again)

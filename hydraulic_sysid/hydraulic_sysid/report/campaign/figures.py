@@ -35,7 +35,7 @@ def distributions(result: Result) -> go.Figure | None:
     titles = [name.replace("_", " ").replace(".", " · ") for name in known]
     panels = Panels(rows, _COLUMNS, gap=(0.06, 0.32 / rows), titles=titles)
     for i, (name, found) in enumerate(known.items()):
-        look = {"type": "histogram", "marker": {"color": style.HORIZON}, "nbinsx": 24}
+        look: dict[str, Any] = {"type": "histogram", "marker": {"color": style.HORIZON}, "nbinsx": 24}
         panels.line(i, style.values(found), style.values([]), name, **look)
         del panels.traces[-1]["y"]
     for i in range(len(known), rows * _COLUMNS):

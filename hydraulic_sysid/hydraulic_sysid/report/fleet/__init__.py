@@ -1,0 +1,3 @@
+"""Many actuators beside each other."""
+
+SCHEMA = "hydraulic_sysid.fleet/1"

@@ -1,0 +1,3 @@
+"""One actuator over many bags."""
+
+SCHEMA = "hydraulic_sysid.monitor/1"
