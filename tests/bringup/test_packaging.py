@@ -195,7 +195,7 @@ ROSDEP = {
     "scipy": "python3-scipy",
 }
 """Keys of rosdep (rosdistro of August 2026, Ubuntu) by what is imported."""
-WITHOUT_KEY = {"daqp", "markupsafe", "mcap", "pint", "plotly", "zstandard"}
+WITHOUT_KEY = {"daqp", "distributed", "markupsafe", "mcap", "pint", "plotly", "pyarrow", "zstandard"}
 TEST_KEYS = {"domain_coordinator", "python3-hypothesis", "python3-pytest", "python3-pytest-timeout"}
 
 

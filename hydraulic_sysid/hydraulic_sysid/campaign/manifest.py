@@ -20,9 +20,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 from hydraulic_interfaces.errors import HydraulicError
+from hydraulic_node_utils.yaml_text import load_yaml
 
 _KEYS = ("verb", "records", "models", "options")
 
@@ -55,6 +57,14 @@ class Manifest:
         return self.verb.split()[-1]
 
 
+def read_yaml(text: str) -> Any:
+    """What a text in YAML says.
+
+    :raises YAMLError: it is none.
+    """
+    return load_yaml(YAML(typ="safe", pure=True), text)
+
+
 def load_manifest(path: Path) -> Manifest:
     """Read a manifest.
 
@@ -62,8 +72,8 @@ def load_manifest(path: Path) -> Manifest:
         nothing.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        content = read_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
         raise CampaignError(f"{path} is no manifest: {error}") from error
     if not isinstance(content, dict) or not isinstance(content.get("verb"), str) or not content["verb"].split():
         raise CampaignError(f"{path}: a manifest states verb: NAME; allowed besides: {', '.join(_KEYS[1:])}")

@@ -36,7 +36,8 @@ def monitored(
     """
     series = gathered(outcomes)
     rows = [_parameter(e, model, limits.get(e.key), bags_per_alarm * len(series), baseline) for e in series]
-    changed = sorted((r for r in rows if r["alarm"]), key=lambda r: -abs(r["alarm"]["size"]))
+    changed = sorted((r for r in rows if r["alarm"]), key=lambda r: (r["alarm"]["at_index"], -abs(r["alarm"]["size"])))
+    rows.sort(key=lambda r: (r["alarm"] is None, r["alarm"]["at_index"] if r["alarm"] else 0))
     return {
         **heading("monitor"),
         "title": f"{model.name} over {len(outcomes)} bags",
@@ -118,6 +119,8 @@ def _verdict(
             f"{quantity(alarm['after'], r['unit'])} after (found at {alarm['at']})"
             + (f"; look at: {r['wear']}." if r["wear"] else ".")
         )
+    if len(changed) > 1:
+        texts.append("What was found later may follow from the first: diagnose the last bags.")
     return {"kind": "changed", "level": "off", "effects": [r["key"] for r in changed], "text": " ".join(texts)}
 
 

@@ -32,7 +32,7 @@ def pooled(values: Array, errors: Array) -> Pooled:
 
     Where the values scatter less than their errors say, nothing lies between.
     """
-    floor = max(1e-12 * float(np.abs(values).max(initial=0.0)), 1e-300)
+    floor = max(1e-12 * float(np.abs(values).max(initial=0.0)), 1e-60)
     variances = np.maximum(errors, floor) ** 2
     weights = 1.0 / variances
     mean = float(weights @ values / weights.sum())

@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
+from ruamel.yaml.error import YAMLError
 
 from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import load_model
@@ -26,7 +26,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid import campaign
 from hydraulic_sysid.campaign.document import document
-from hydraulic_sysid.campaign.manifest import model_files, record_groups, variations
+from hydraulic_sysid.campaign.manifest import model_files, read_yaml, record_groups, variations
 from hydraulic_sysid.campaign.table import FORMATS, write_table
 from hydraulic_sysid.data import results
 from hydraulic_sysid.verbs._campaign_options import add_crew_options, chosen_crew
@@ -101,8 +101,8 @@ def _manifest(options: argparse.Namespace) -> campaign.Manifest:
 
 def _mapping(text: str) -> dict[str, Any]:
     try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError as error:
+        value = read_yaml(text)
+    except YAMLError as error:
         raise cli.UsageError(f"--option {text!r} is no YAML: {error}") from error
     if not isinstance(value, dict):
         raise cli.UsageError(f"--option {text!r}: allowed is a mapping, such as '{{segment: 0.3}}'")

@@ -13,14 +13,14 @@ import math
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rich.console import Console
+from ruamel.yaml.error import YAMLError
 
 from hydraulic_node_utils import cli, tables
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid import campaign
-from hydraulic_sysid.campaign.manifest import record_groups
+from hydraulic_sysid.campaign.manifest import read_yaml, record_groups
 from hydraulic_sysid.data.display import number, percent, quantity
 from hydraulic_sysid.monitoring import document, estimates
 from hydraulic_sysid.monitoring.random_effects import pooled
@@ -96,8 +96,8 @@ def _fitted(options: argparse.Namespace, say: opt.Say) -> tuple[Units, dict[str,
     if not options.model:
         raise cli.UsageError("--model is needed to fit records")
     try:
-        content = yaml.safe_load(options.units.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
+        content = read_yaml(options.units.read_text(encoding="utf-8"))
+    except YAMLError as error:
         raise cli.UsageError(f"{options.units} is no YAML: {error}") from error
     if not isinstance(content, dict) or not all(isinstance(v, list) for v in content.values()):
         raise cli.UsageError(

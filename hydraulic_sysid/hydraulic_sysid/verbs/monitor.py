@@ -39,7 +39,7 @@ def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
     parser = opt.parser("monitor", __doc__, EPILOG)
     opt.add_model_option(parser)
-    add_bag_options(parser, "bags in the order of their times, or of their names; each match of a pattern is one")
+    _add_bag_options(parser)
     parser.add_argument("--limit", metavar="KEY=VALUE", nargs="+", default=[], help="limits to forecast to, with units")
     parser.add_argument(
         "--bags-per-false-alarm", metavar="N", type=cli.positive, default=_BAGS_PER_ALARM,
@@ -52,9 +52,11 @@ def main(argv: list[str] | None = None) -> int:
     return opt.run(parser, _monitor, _show, argv)
 
 
-def add_bag_options(parser: argparse.ArgumentParser, what: str) -> None:
-    """``--record``, ``--columns`` and ``--watch``."""
-    parser.add_argument("--record", metavar="PATTERN", nargs="+", required=True, help=what)
+def _add_bag_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--record", metavar="PATTERN", nargs="+", required=True,
+        help="bags, in the order of their times or else of their names; each match of a pattern is one",
+    )  # fmt: skip
     parser.add_argument("--columns", metavar="MAP", help="column map of CSV and MAT records")
     parser.add_argument(
         "--watch", metavar="NAME", nargs="+", default=[],
@@ -71,7 +73,7 @@ def _monitor(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     names = estimates.watched(model, options.watch)
     followed, keys = estimates.followed(model, names)
     limits = _limits(options.limit, followed, keys)
-    bags = {name: paths[0] for name, paths in record_groups(options.record, Path(), "--record").items()}
+    bags = {_short(name): paths[0] for name, paths in record_groups(options.record, Path(), "--record").items()}
     cases = estimates.bag_cases(options.model, bags, options.columns, names)
     outcomes = campaign.run(
         estimates.estimate, cases, options.out.resolve() / "monitor_bags", chosen_crew(options),
@@ -81,6 +83,10 @@ def _monitor(options: argparse.Namespace, say: opt.Say) -> opt.Done:
         raise cli.UsageError(f"no bag could be fitted; the first: {outcomes[0].error.strip().rpartition(chr(10))[2]}")
     result = document.monitored(followed, outcomes, limits, options.bags_per_false_alarm, options.baseline)
     return opt.Done(result, good=not result["changed"])
+
+
+def _short(name: str) -> str:
+    return name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mat")
 
 
 def _limits(texts: list[str], model: Model, keys: list[str]) -> dict[str, float]:
@@ -101,6 +107,3 @@ def _show(result: dict[str, Any], console: Console) -> None:
         table.add_row(r["key"], quantity(float(r["values"][-1]), r["unit"], error=float(r["errors"][-1])), *cells)
     console.print(table)
     console.print(result["verdict"]["text"], markup=False)
-
-
-__all__ = ["add_bag_options", "main"]
