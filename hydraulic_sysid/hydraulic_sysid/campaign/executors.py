@@ -14,6 +14,7 @@ from typing import Any
 from hydraulic_node_utils.processors import THREADS_VARIABLE, usable
 from hydraulic_sysid.campaign.manifest import CampaignError
 
+_PATIENCE = 30  # s, for a scheduler to answer
 _PER_WORKER = 2  # cases under way or waiting at a worker, so that none waits for the scheduler
 
 
@@ -63,7 +64,7 @@ def dask_cluster(address: str) -> Crew:
     except ImportError:
         raise CampaignError("--scheduler needs Dask: pip install distributed") from None
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=_PATIENCE)
     except (OSError, ValueError, TypeError) as error:
         raise CampaignError(f"--scheduler {address}: no Dask scheduler answers there ({error})") from error
     number = sum(client.nthreads().values())
