@@ -188,31 +188,35 @@ class Writer:
         )  # fmt: skip
 
 
-def write_module(library: Library) -> str:
-    """The text of the module for this library: `rhs` and `run` (see `plant` for how they are called)."""
-    layout = Layout(library)
+def places(layout: Layout) -> dict[str, object]:
+    """What fills the places of the templates in `equations` for a library."""
     w = Writer(layout)
     stick = layout.states["stick"]
     shared = {name: w.slot(name) for name in slots.SLOTS}
-    rhs = _fill(
+    rhs = fill(
         RHS, **shared, stick=stick, stick_r=stick - layout.n_rates, dynamics=w.dynamics(),
         bristle_length=w.parameter("bristle_length"), bristle_time=w.parameter("bristle_time"),
     )  # fmt: skip
+    return {
+        "stick": stick, "n_rates": layout.n_rates, "n_states": len(layout.states), "constants1": w.constants(),
+        "switches1": w.switches(), "rhs1": rhs, "rhs4": rhs, "bend": REVERSAL_BEND, "shorter": REVERSAL_STEP,
+        "most": MOST_SUBSTEPS, "command": shared["command"], "position_sensor": shared["position_sensor"],
+        "pressure_sensor": shared["pressure_sensor"], "position_sensor7": shared["position_sensor"],
+        "pressure_sensor7": shared["pressure_sensor"],
+    }  # fmt: skip
+
+
+def write_module(library: Library) -> str:
+    """The text of the module for this library: `rhs` and `run` (see `plant` for how they are called)."""
     functions = "\n".join(
         f'{e.name}__{which} = njit(FUNCTIONS["{e.name}.{which}"], error_model="numpy")'
         for e in library.values()
         for which in e.functions()
     )
-    return _fill(
-        MODULE, stick=stick, functions=functions, n_rates=layout.n_rates, n_states=len(layout.states),
-        constants1=w.constants(), switches1=w.switches(), rhs1=rhs, rhs4=rhs,
-        bend=REVERSAL_BEND, shorter=REVERSAL_STEP, most=MOST_SUBSTEPS,
-        command=shared["command"], position_sensor7=shared["position_sensor"],
-        pressure_sensor7=shared["pressure_sensor"],
-    )  # fmt: skip
+    return fill(MODULE, functions=functions, **places(Layout(library)))
 
 
-def _fill(template: str, **parts: object) -> str:
+def fill(template: str, **parts: object) -> str:
     """Put parts into a template; a part of several lines takes the indentation of its place."""
     lines = []
     for line in template.splitlines():
