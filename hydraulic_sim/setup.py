@@ -5,7 +5,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "hydraulic_sim"
-DATA = ("c", "h", "csv", "csv.gz", "css", "eds", "html", "js", "json", "xml", "yaml")  # files installed beside the modules
+DATA = ("c", "csv", "csv.gz", "css", "eds", "h", "html", "js", "json", "xml", "yaml")  # files beside the modules
 
 
 def executables() -> list[str]:

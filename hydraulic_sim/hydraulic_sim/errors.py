@@ -13,3 +13,7 @@ class ModelError(HydraulicError, ValueError):
 
 class SimulationError(HydraulicError, RuntimeError):
     """A simulation left the numbers: NaN or infinity, or a step that cannot follow the physics."""
+
+
+class ExchangeError(HydraulicError, ValueError):
+    """A model cannot be written in another form, or one of another form cannot be run."""

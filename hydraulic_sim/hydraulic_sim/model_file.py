@@ -84,16 +84,24 @@ def save_model(model: Model, path: str | Path, overwrite: bool = False) -> Path:
     if not target.parent.is_dir():
         raise ModelError(f"{target}: there is no folder {target.parent}")
     model.check_complete()
+    try:
+        write_text(target, model_text(model, target), overwrite=overwrite)
+    except FileExistsError:
+        raise ModelError(f"{target} exists; give another name (nothing is overwritten silently)") from None
+    return target
+
+
+def model_text(model: Model, target: Path) -> str:
+    """The text of a model's file at ``target``, to whose folder paths in it are relative.
+
+    :raises ModelError: the model holds something that has no place in a file.
+    """
     stream = io.StringIO()
     try:
         _yaml().dump(document(model, target), stream)
     except RepresenterError as error:
         raise ModelError(f"{target}: {error}") from None
-    try:
-        write_text(target, stream.getvalue(), overwrite=overwrite)
-    except FileExistsError:
-        raise ModelError(f"{target} exists; give another name (nothing is overwritten silently)") from None
-    return target
+    return stream.getvalue()
 
 
 def _yaml() -> YAML:

@@ -186,6 +186,7 @@ ROSDEP = {
     "can": "python3-can",
     "canopen": "canopen-pip",
     "control": "python-control-pip",
+    "h5py": "python3-h5py",
     "jinja2": "python3-jinja2",
     "numba": "python3-numba",
     "numpy": "python3-numpy",
@@ -195,7 +196,9 @@ ROSDEP = {
     "scipy": "python3-scipy",
 }
 """Keys of rosdep (rosdistro of August 2026, Ubuntu) by what is imported."""
-WITHOUT_KEY = {"daqp", "distributed", "markupsafe", "mcap", "pint", "plotly", "pyarrow", "zstandard"}
+WITHOUT_KEY = {
+    *("daqp", "distributed", "fmpy", "markupsafe", "mcap", "pint", "plotly", "pyarrow", "zstandard"),
+}
 TEST_KEYS = {"domain_coordinator", "python3-hypothesis", "python3-pytest", "python3-pytest-timeout"}
 
 

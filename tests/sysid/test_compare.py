@@ -13,13 +13,18 @@ from hydraulic_sim.model_file import Model, load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.decimation import envelope
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.diagnosis.compare import ComparisonError, compare
+from hydraulic_sysid.diagnosis.compare import ComparisonError, ModelSubject
+from hydraulic_sysid.diagnosis.compare import compare as compare_subject
 from hydraulic_sysid.diagnosis.compare.error_maps import Binning, error_map, folds_of, independent_samples
 from hydraulic_sysid.diagnosis.compare.spectra import amplitude_density, noise_density
 from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
 
 DT = 1e-3
 NOISE = {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}
+
+
+def compare(model: Model, *arguments: Any, **settings: Any) -> dict[str, Any]:
+    return compare_subject(ModelSubject(model), *arguments, **settings)
 
 
 def drive(seconds: float, seed: int) -> np.ndarray:

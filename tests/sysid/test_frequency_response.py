@@ -12,7 +12,7 @@ from hostile_page import assert_cannot_inject
 from scipy import signal
 
 from hydraulic_node_utils.cli import run_verb
-from hydraulic_sysid.data.records import Record, save_csv
+from hydraulic_sysid.data.records import Record, save
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.signals.odd_random_phase_multisine import OddRandomPhaseMultisine
 from hydraulic_sysid.excitation.signals.random_phase_multisine import RandomPhaseMultisine
@@ -214,7 +214,7 @@ def test_what_no_linear_model_can_fit_is_what_the_best_one_leaves() -> None:
 def test_the_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan = multisine(OddRandomPhaseMultisine, 3)
     one = record(plan, linear, 1e-3)
-    file = save_csv(Record.sampled("r", DT, {"drive": one["drive"], "position": one["position"]}), tmp_path / "r.csv")
+    file = save(Record.sampled("r", DT, {"drive": one["drive"], "position": one["position"]}), tmp_path / "r.csv")
     arguments = ["frequency_response", "--record", str(file)]
     periodic = ["--period", "2", "--start", "1", "--out", str(tmp_path / "bla")]
     assert run_verb("hydraulic_sysid", [*arguments, *periodic]) == 0

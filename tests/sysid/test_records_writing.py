@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hydraulic_sysid.data.records import Record, RecordError, read_records, save_csv, to_bag
+from hydraulic_sysid.data.records import Record, RecordError, read_records, save, to_bag
 
 
 def assert_same(one: Sequence[Record], other: Sequence[Record]) -> None:
@@ -30,7 +30,7 @@ def test_bag_and_csv_of_a_record_give_the_same_record(tmp_path: Path, dt: float)
     record = Record.sampled("run", dt, channels(500))
     bagged = read_records(to_bag(record, tmp_path / "run"))
     for name in ("run.csv", "run.csv.gz"):
-        assert_same(bagged, read_records(save_csv(record, tmp_path / name)))
+        assert_same(bagged, read_records(save(record, tmp_path / name)))
     assert_same((record,), bagged)
 
 
@@ -46,7 +46,7 @@ def test_nothing_is_written_over(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match="exists"):
         to_bag(record, tmp_path / "run")
     with pytest.raises(RecordError, match="exists"):
-        save_csv(record, tmp_path / "run.csv")
+        save(record, tmp_path / "run.csv")
     assert (tmp_path / "run.csv").read_text() == "mine" and not list((tmp_path / "run").iterdir())
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.csv"]
 

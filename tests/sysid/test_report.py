@@ -17,7 +17,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sysid import report
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import read_all
-from hydraulic_sysid.diagnosis.compare import compare
+from hydraulic_sysid.diagnosis.compare import ModelSubject, compare
 from hydraulic_sysid.linear.identification import identify
 from hydraulic_sysid.report import render, write_page
 from hydraulic_sysid.report.compare import figures as compare_figures
@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = tmp_path_factory.mktemp("run")
     records = read_all([SAMPLE / "triangle.csv.gz", SAMPLE / "steps.csv.gz"])
     results.write_result(run, identify(records)[0])
-    results.write_result(run, compare(load_model("sample_bench"), records))
+    results.write_result(run, compare(ModelSubject(load_model("sample_bench")), records))
     write_page(run, results.read_folder(run))
     return run
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from hydraulic_sim.verbs import export
 from hydraulic_sysid.verbs import compare, identify, report
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
@@ -124,3 +125,31 @@ def test_unknown_columns_are_named(tmp_path: Path, capsys: pytest.CaptureFixture
         stream.write("a,b\n0,1\n1,2\n")
     assert compare.main(["--model", "sample_bench", "--record", str(strange), "--out", str(tmp_path / "run")]) == 2
     assert "strange.csv.gz" in capsys.readouterr().err
+
+
+def test_an_fmu_is_compared_like_the_model_that_it_comes_from(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert export.main(["--model", "sample_bench", "--fmu", str(tmp_path / "a.fmu")]) == 0
+    capsys.readouterr()
+    found = []
+    for what in (["--model", "sample_bench"], ["--fmu", str(tmp_path / "a.fmu")]):
+        assert compare.main([*what, "--record", STEPS, "--out", str(tmp_path / what[0][2:]), "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    model, fmu = (f["summary"] for f in found)
+    assert (found[0]["model"]["fmu"], found[1]["model"]["fmu"]) == (False, True)
+    assert set(model) == set(fmu)
+    for channel in ("position", "velocity", "load_pressure"):
+        for mode in ("free_run", "horizon"):
+            assert fmu[channel][mode]["rmse"] == pytest.approx(model[channel][mode]["rmse"], rel=0.05), (channel, mode)
+    page = (tmp_path / "fmu" / "report.html").read_text(encoding="utf-8")
+    assert "Describe the actuator in a model file" in page and "hydraulic_sysid diagnose" not in page
+
+
+def test_compare_refuses_an_fmu_that_has_no_position(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert export.main(["--model", "sample_bench", "--fmu", str(tmp_path / "a.fmu")]) == 0
+    arguments = ["--fmu", str(tmp_path / "a.fmu"), "--record", STEPS, "--out", str(tmp_path / "run")]
+    assert compare.main([*arguments, "--variables", "position=nothing"]) == 2
+    assert "no variable 'nothing' for position" in capsys.readouterr().err
+    assert compare.main([*arguments[2:], "--model", "sample_bench", "--variables", "position=x"]) == 2
+    assert "there is no --fmu" in capsys.readouterr().err

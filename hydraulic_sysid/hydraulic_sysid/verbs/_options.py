@@ -101,9 +101,13 @@ def _without(value: Any, names: Sequence[str]) -> Any:
     return [_without(v, names) for v in value] if isinstance(value, list) else value
 
 
-def add_model_option(parser: argparse.ArgumentParser, what: str = "model file, or the name of a preset") -> None:
-    """``--model FILE``; read it with `load_model`. And ``--trust DIR``."""
-    parser.add_argument("--model", metavar="FILE", required=True, help=what)
+def add_model_option(
+    parser: argparse.ArgumentParser,
+    what: str = "model file, or the name of a preset",
+    within: argparse._MutuallyExclusiveGroup | None = None,
+) -> None:
+    """``--model FILE``, one of a group ``within`` which others are; read it with `load_model`. And ``--trust DIR``."""
+    (within or parser).add_argument("--model", metavar="FILE", required=within is None, help=what)
     add_trust_option(parser)
 
 

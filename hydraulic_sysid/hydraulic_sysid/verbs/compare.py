@@ -1,4 +1,4 @@
-"""Compare a model with records: how far off it is, and where.
+"""Compare a model, or an FMU, with records: how far off it is, and where.
 
 Runs the model beside every record in free run, a horizon ahead and one step ahead, and writes the figures
 (compare.json) and a page to look at (report.html) into a folder.
@@ -8,22 +8,27 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from hydraulic_node_utils import tables
+from hydraulic_node_utils import cli, tables
+from hydraulic_sim.exchange.foreign import KEYS, ForeignFmu
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.display import first_upper, number, quantity
-from hydraulic_sysid.diagnosis.compare import compare
+from hydraulic_sysid.diagnosis.compare import ModelSubject, compare
 from hydraulic_sysid.diagnosis.compare.findings import AT_FLOOR
+from hydraulic_sysid.diagnosis.compare.fmu_subject import FmuSubject
+from hydraulic_sysid.diagnosis.compare.subject import Subject
 from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
 examples:
   python -m hydraulic_sysid compare --model sample_bench --record examples/sample_bench --out runs/first
   python -m hydraulic_sysid compare --model my.yaml --record runs/bag --horizon 1 --out runs/bag-compared
+  python -m hydraulic_sysid compare --fmu axis.fmu --variables drive=u position=rod.s --record runs/bag --out runs/fmu
 """
 _LISTED = 3  # findings on the terminal; all of them stand in the results
 
@@ -31,16 +36,41 @@ _LISTED = 3  # findings on the terminal; all of them stand in the results
 def main(argv: list[str] | None = None) -> int:
     """Entry of the verb; its exit code."""
     parser = opt.parser("compare", __doc__, EPILOG)
-    opt.add_model_option(parser)
+    what = parser.add_mutually_exclusive_group(required=True)
+    opt.add_model_option(parser, within=what)
+    what.add_argument(
+        "--fmu", metavar="FILE", type=Path, help="an FMU of any tool (FMI 2.0, co-simulation), which is run"
+    )
+    parser.add_argument(
+        "--variables",
+        metavar="KEY=NAME",
+        nargs="+",
+        type=_pair,
+        default=[],
+        help=f"the FMU's own names, where they are others; keys: {', '.join(KEYS)}",
+    )
     opt.add_record_options(parser)
     parser.add_argument("--horizon", metavar="SECONDS", type=float, default=0.5, help="how far ahead (default 0.5)")
     return opt.run(parser, _compare, _show, argv, bulky=("traces", "drive", "error_maps", "spectra", "error_growth"))
 
 
 def _compare(options: argparse.Namespace, say: opt.Say) -> opt.Done:
-    model = load_model(options.model)
+    if options.variables and not options.fmu:
+        raise cli.UsageError("--variables names variables of an FMU; there is no --fmu")
+    subject: Subject
+    if options.fmu:
+        subject = FmuSubject(ForeignFmu(options.fmu, dict(options.variables)))
+    else:
+        subject = ModelSubject(load_model(options.model))
     records = opt.read_records(options)
-    return opt.Done(compare(model, records, options.horizon, lambda name: say(f"comparing {name}")))
+    return opt.Done(compare(subject, records, options.horizon, lambda name: say(f"comparing {name}")))
+
+
+def _pair(text: str) -> tuple[str, str]:
+    key, equals, name = text.partition("=")
+    if not (key and equals and name):
+        raise argparse.ArgumentTypeError(f"{text!r} is not KEY=NAME")
+    return key, name
 
 
 def _show(result: dict[str, Any], console: Console) -> None:

@@ -54,6 +54,8 @@ def read(path: Path, names: Iterable[str]) -> Bag:
 
     if path.is_dir() and not (path / FILE_NAME).is_file():
         hint = f"make it whole with: python -m hydraulic_sysid recover {path}"
+        if any(path.glob("*.db3")):
+            hint = f"name its .db3 file, or make it whole with: ros2 bag reindex -s sqlite3 {path}"
         raise BagError(path, f"the bag was not closed (no {FILE_NAME}); {hint}")
     try:
         with Reader(path) as reader:

@@ -14,7 +14,6 @@ from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.bag import cdr, reader
 from hydraulic_sysid.data.bag.reader import Bag
 from hydraulic_sysid.data.bag.types import json_data
-from hydraulic_sysid.data.bag.writer import SUFFIX
 from hydraulic_sysid.data.errors import BagError, TimeError
 from hydraulic_sysid.data.records.experiments import Span, spans
 from hydraulic_sysid.data.records.record import Record
@@ -82,7 +81,7 @@ def _records(
         description["plant"] = plant
     if bag.custom:
         description["bag"] = {key: _plain(value) for key, value in bag.custom.items() if key not in _TOLD_ELSEWHERE}
-    name = bag.path.name.removesuffix(SUFFIX)
+    name = bag.path.name if bag.path.is_dir() else bag.path.stem
     title = f"{name}.{span.name}" if span.name else name
     return evenly_sampled(samples, irregular, title, [*notes, *span.notes], description)
 

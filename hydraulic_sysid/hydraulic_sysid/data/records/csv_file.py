@@ -4,18 +4,40 @@ from __future__ import annotations
 
 import csv
 import gzip
+import io
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import ColumnMapError, FileError
+from hydraulic_sysid.data.records.channels import TIME_UNIT
 from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header, named_columns
+from hydraulic_sysid.data.records.record import Record
 
 SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz")
 _GZIP_MAGIC = b"\x1f\x8b"
+
+
+def table(path: Path, columns: ColumnMap | None = None) -> CsvTable:
+    """See `CsvTable`."""
+    return CsvTable(path, columns)
+
+
+def content(record: Record) -> bytes:
+    """The table of a record; reading gives the same numbers back.
+
+    Channels with a unit of their own need a column map to be read again.
+    """
+    names = [f"time_{TIME_UNIT}", *(f"{name}_{record.unit(name)}" for name in record.channels)]
+    text = io.StringIO()
+    text.write(",".join(names) + "\n")
+    # Seventeen digits give every double back exactly.
+    np.savetxt(text, np.column_stack([record.time, *record.channels.values()]), "%.17g", ",")
+    return text.getvalue().encode()
 
 
 class CsvTable:
@@ -29,6 +51,7 @@ class CsvTable:
 
     def __init__(self, path: Path, columns: ColumnMap | None = None) -> None:
         self.path = path
+        self.description: Mapping[str, Any] = {}
         lines = _text(path).splitlines()
         rows = [number for number, line in enumerate(lines, 1) if line and not line.isspace()]
         if len(rows) != len(lines):

@@ -6,19 +6,19 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from hydraulic_sysid.data.errors import FileError, RecordError
-from hydraulic_sysid.data.records import csv_file, mat_file
 from hydraulic_sysid.data.records.column_map import ColumnMap, load_column_map
-from hydraulic_sysid.data.records.csv_file import CsvTable
-from hydraulic_sysid.data.records.mat_file import MatTable
+from hydraulic_sysid.data.records.formats import SUFFIXES, format_of, suffix_of
 from hydraulic_sysid.data.records.record import Record
 from hydraulic_sysid.data.records.table import records_of_table
 
-_BAG_SUFFIX = ".mcap"
-_SUFFIXES = (*csv_file.SUFFIXES, *mat_file.SUFFIXES, _BAG_SUFFIX)
+_MCAP, _SQLITE = ".mcap", ".db3"
+_SUFFIXES = (*SUFFIXES, _MCAP, _SQLITE)
 
 
 def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None) -> list[Record]:
-    """Records in a bag folder, a .csv, .csv.gz or .mat file, or a folder of such, in the order of their names.
+    """Records in a bag folder, a file of one of the suffixes, or a folder of such, in the order of their names.
+
+    Bags are of MCAP or SQLite; files .mcap and .db3, and tables as CSV, MATLAB, HDF5 and Parquet files.
 
     ``columns`` is a column map, a YAML file with one, or the name of a shipped one; without it, headers must
     say channel and unit (``position_mm``). Bags need none.
@@ -54,7 +54,7 @@ def read_all(paths: Iterable[Path | str], columns: ColumnMap | Path | str | None
 
 def _is_bag(folder: Path) -> bool:
     """Whether a folder is a bag, complete or left behind by a recorder."""
-    return (folder / "metadata.yaml").is_file() or any(folder.glob(f"*{_BAG_SUFFIX}"))
+    return (folder / "metadata.yaml").is_file() or any(any(folder.glob(f"*{s}")) for s in (_MCAP, _SQLITE))
 
 
 def _holds_record(path: Path) -> bool:
@@ -62,15 +62,14 @@ def _holds_record(path: Path) -> bool:
 
 
 def _read(path: Path, columns: ColumnMap | None) -> list[Record]:
-    suffix = next((s for s in sorted(_SUFFIXES, key=len, reverse=True) if path.name.lower().endswith(s)), "")
-    if path.is_dir() or suffix == _BAG_SUFFIX:
+    if path.is_dir() or path.name.lower().endswith((_MCAP, _SQLITE)):
         # Here and not above: what reads bags takes long to load, most records are tables, and it needs the errors
         # of this package itself.
         from hydraulic_sysid.data.records.bag_record import read_bag
 
         return read_bag(path, columns.irregular if columns else "error")
-    table = MatTable(path) if suffix in mat_file.SUFFIXES else CsvTable(path, columns)
-    return records_of_table(table, columns, path.name[: -len(suffix)])
+    name = path.name[: -len(suffix_of(path))]
+    return records_of_table(format_of(path).table(path, columns), columns, name)
 
 
 def _kinds() -> str:

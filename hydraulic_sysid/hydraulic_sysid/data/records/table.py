@@ -16,6 +16,7 @@ from hydraulic_sysid.data.records.channels import HELD
 from hydraulic_sysid.data.records.column_map import Column, ColumnMap
 from hydraulic_sysid.data.records.record import Record
 
+_ANEW = ("name", "notes", "columns", "start_s", "stamp_deviation_s", "part")  # of a description: said anew when read
 _WORTH_A_NOTE = 0.05  # of a period that stamps are off the even grid
 _MOST_SAMPLES = 20_000_000  # of a resampled record
 
@@ -24,6 +25,8 @@ class Table(Protocol):
     """Named or numbered columns of numbers, read from one file."""
 
     path: Path
+    description: Mapping[str, Any]
+    """What the file says of the record, besides its channels."""
 
     @property
     def names(self) -> Sequence[str]:
@@ -71,7 +74,9 @@ def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list
         notes = list(columns.notes)
         channels = {channel: _finite(table, column) for channel, column in mapped.items()}
         title = f"{name}.{part}" if part else name
-        description: dict[str, Any] = {"columns": columns.name} if columns.name else {}
+        kept = {key: value for key, value in table.description.items() if key not in _ANEW}
+        notes += [n for n in table.description.get("notes", ()) if isinstance(n, str)]
+        description: dict[str, Any] = {**kept, **({"columns": columns.name} if columns.name else {})}
         drive_from_command(channels, notes)
         sizes = {values.size for values in channels.values()}
         if columns.dt is not None:

@@ -1,9 +1,8 @@
-"""Writing records: as CSV, and as a bag that holds what the nodes would have published."""
+"""Writing records: as tables, and as a bag that holds what the nodes would have published."""
 
 from __future__ import annotations
 
 import gzip
-import io
 import json
 import tempfile
 from collections.abc import Iterator
@@ -15,7 +14,8 @@ from hydraulic_interfaces.contract import PISTON, PLANT_FRAME, SERVOVALVE, find_
 from hydraulic_node_utils.whole_file import write_text
 from hydraulic_sim.arrays import Array, Index
 from hydraulic_sysid.data.errors import BagError, FileError, RecordError
-from hydraulic_sysid.data.records.channels import CHANNELS, TIME_UNIT
+from hydraulic_sysid.data.records.channels import CHANNELS
+from hydraulic_sysid.data.records.formats import format_of, suffix_of
 from hydraulic_sysid.data.records.record import Record
 
 _DEPTH = 100  # of the history that a player of the bag offers
@@ -25,21 +25,14 @@ _JOINT_FIELDS = ("position", "velocity", "effort")
 _PRESSURES = ("pressure_a", "pressure_b", "pressure_supply")
 
 
-def save_csv(record: Record, path: Path | str) -> Path:
-    """Write a record as CSV (compressed where the name ends in .gz); reading gives the same numbers back.
+def save(record: Record, path: Path | str) -> Path:
+    """Write a record as the table that the suffix names (`formats.SUFFIXES`); reading gives the same numbers back.
 
-    Channels with a unit of their own need a column map to be read again.
-
-    :raises FileError: the file exists.
+    :raises FileError: the file exists, or no such suffix.
     """
     path = Path(path)
-    names = [f"time_{TIME_UNIT}", *(f"{name}_{record.unit(name)}" for name in record.channels)]
-    text = io.StringIO()
-    text.write(",".join(names) + "\n")
-    # Seventeen digits give every double back exactly.
-    np.savetxt(text, np.column_stack([record.time, *record.channels.values()]), "%.17g", ",")
-    data = text.getvalue().encode()
-    if path.suffix == ".gz":
+    data = format_of(path).content(record)
+    if suffix_of(path).endswith(".gz"):
         data = gzip.compress(data, mtime=0)
     try:
         write_text(path, data, overwrite=False)

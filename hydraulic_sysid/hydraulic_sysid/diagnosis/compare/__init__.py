@@ -2,5 +2,6 @@
 
 from .comparison import compare
 from .prediction import ComparisonError
+from .subject import ModelSubject
 
-__all__ = ["ComparisonError", "compare"]
+__all__ = ["ComparisonError", "ModelSubject", "compare"]

@@ -34,9 +34,23 @@ COMPARED = ("position", "velocity", "pressure_a", "pressure_b", "load_pressure",
 _NUMERICAL = 1e-6  # of the largest value: what a record without noise is not held to
 
 
-def load_pressure(pressure_a: Array, pressure_b: Array, model: Model) -> Array:
-    """p_A − p_B·A_b/A_a: the pressures' force over the area of side A."""
-    return pressure_a - pressure_b * (model.value("piston_area_b") / model.value("piston_area_a"))
+@dataclass(frozen=True)
+class Scales:
+    """What turns measured channels into those that are compared: A_b/A_a (None: unknown), spool travel [m]."""
+
+    area_ratio: float | None
+    spool_travel: float
+
+    @classmethod
+    def of(cls, model: Model) -> Scales:
+        """Those of a model file."""
+        return cls(model.value("piston_area_b") / model.value("piston_area_a"), model.value("spool_travel"))
+
+    def with_load_pressure(self, channels: dict[str, Array]) -> dict[str, Array]:
+        """The channels and p_A − p_B·A_b/A_a, the pressures' force over the area of side A, where it is known."""
+        if self.area_ratio is None or not {"pressure_a", "pressure_b"} <= channels.keys():
+            return channels
+        return {**channels, "load_pressure": channels["pressure_a"] - channels["pressure_b"] * self.area_ratio}
 
 
 @dataclass(frozen=True)
@@ -54,20 +68,20 @@ class Measured:
         return tuple(name for name in COMPARED if name in self.channels)
 
 
-def measured(record: Record, model: Model, to_velocity: VelocityFilter | None = None) -> Measured:
+def measured(record: Record, scales: Scales, to_velocity: VelocityFilter | None = None) -> Measured:
     """Channels, derived channels and noise of a record that has at least ``drive`` and ``position``.
 
     ``to_velocity`` fixes the derivative filter; otherwise the record's own noise and motion choose it.
     """
     channels = {name: record[name] for name in UNITS if name in record and name != "velocity"}
     if "spool" in channels:
-        channels["spool"] = channels["spool"] / model.value("spool_travel")
+        channels["spool"] = channels["spool"] / scales.spool_travel
     noise = {name: _noise(values) for name, values in channels.items()}
     to_velocity = to_velocity or VelocityFilter.for_signal(channels["position"], record.dt, noise["position"])
     channels["velocity"] = to_velocity(record["position"])
     noise["velocity"] = noise["position"] * to_velocity.noise_gain
-    if "pressure_a" in channels and "pressure_b" in channels:
-        channels["load_pressure"] = load_pressure(channels["pressure_a"], channels["pressure_b"], model)
+    channels = scales.with_load_pressure(channels)
+    if "load_pressure" in channels:
         noise["load_pressure"] = _noise(channels["load_pressure"])
     return Measured(record, channels, noise, to_velocity)
 

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from hydraulic_node_utils import processors
-from hydraulic_sim.model_file import Model
-from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import TITLES, number, percent
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
@@ -18,12 +16,13 @@ from hydraulic_sysid.estimation import noise
 
 from . import findings
 from .channels import UNITS
-from .document import model_document, record_document
+from .document import record_document
 from .error_maps import DIRECTION_EDGES, Binning, ErrorMap, directions, error_map, folds_of, independent_samples
 from .findings import Finding
 from .prediction import TILES, ComparisonError, check
 from .reference_run import MODES, Compared, run
 from .spectra import SEGMENT_SECONDS
+from .subject import Subject
 
 Progress = Callable[[str], None]
 
@@ -37,9 +36,9 @@ _SECOND = 0.8  # a second variable is named if it explains at least this part of
 
 
 def compare(
-    model: Model, records: Sequence[Record], horizon: float = 0.5, progress: Progress | None = None
+    subject: Subject, records: Sequence[Record], horizon: float = 0.5, progress: Progress | None = None
 ) -> dict[str, Any]:
-    """Result document of a model set against records; arrays are NumPy, SI.
+    """Result document of a model (`ModelSubject`) or another subject set against records; arrays are NumPy, SI.
 
     ``horizon``: seconds ahead of the finite-horizon prediction. ``progress`` is called with the name of each record as
     its turn comes.
@@ -51,8 +50,7 @@ def compare(
         raise ComparisonError("there is no record to compare with")
     for record in records:
         check(record, horizon)
-    plant = Plant(model)
-    compared = _run_all(model, plant, records, horizon, progress)
+    compared = _run_all(subject, records, horizon, progress)
     channels = [name for name in UNITS if any(name in c.data.compared for c in compared)]
     maps = _maps(compared, channels)
     documents = [{**record_document(c), "error_maps": _plain_maps(_maps([c], c.data.compared))} for c in compared]
@@ -60,7 +58,7 @@ def compare(
     found = _findings(documents, summary, maps, horizon)
     return {
         **heading("compare", 2),
-        "model": model_document(model),
+        "model": subject.document(),
         "settings": {
             "horizon": horizon,
             "horizon_part": 1.0 / TILES,
@@ -82,15 +80,13 @@ def compare(
     }
 
 
-def _run_all(
-    model: Model, plant: Plant, records: Sequence[Record], horizon: float, progress: Progress | None
-) -> list[Compared]:
+def _run_all(subject: Subject, records: Sequence[Record], horizon: float, progress: Progress | None) -> list[Compared]:
     """All records in their order; the plant's kernels run beside each other on as many cores as there are."""
 
     def one(index: int) -> Compared:
         if progress is not None:
             progress(records[index].name)
-        return run(model, plant, records[index], horizon, seed=index)
+        return run(subject, records[index], horizon, seed=index)
 
     with ThreadPoolExecutor(max_workers=processors.usable()) as pool:
         return list(pool.map(one, range(len(records))))

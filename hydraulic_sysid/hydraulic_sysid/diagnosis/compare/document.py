@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sim.model_file import Model
 from hydraulic_sysid.data.decimation import trace
 
 from .reference_run import MODES, Compared
@@ -91,26 +90,4 @@ def _spectra(c: Compared, name: str) -> dict[str, Array]:
         "measured": signal,
         "free_run_error": amplitude_density(free, dt)[1],
         "noise": noise_density(frequency, sigma, dt, derivative),
-    }
-
-
-def model_document(model: Model) -> dict[str, Any]:
-    """Name, effects, parameters and history of a model."""
-    parameters = [
-        {
-            "name": key,
-            "value": model.value(key),
-            "unit": model.parameter(key).unit,
-            "source": model.entry(key).source,
-            "standard_error": model.entry(key).standard_error,
-        }
-        for key in model.keys()  # noqa: SIM118 - a model is no mapping
-    ]
-    return {
-        "name": model.name,
-        "path": str(model.path) if model.path else None,
-        "description": model.description,
-        "effects": list(model.effects),
-        "parameters": parameters,
-        "history": [dict(line) for line in model.history],
     }

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sim.model_file import Model
-from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 
 from .channels import Measured, measured
-from .prediction import Predictions, inner_states, predict
+from .prediction import Predictions, predict
+from .subject import Subject
 
 MODES = ("free_run", "horizon", "one_step")
 
@@ -41,18 +40,19 @@ class Compared:
         return self.reference.channels[channel] - getattr(self.reference_runs, mode)[channel]
 
 
-def run(model: Model, plant: Plant, record: Record, horizon: float, seed: int = 0) -> Compared:
+def run(subject: Subject, record: Record, horizon: float, seed: int = 0) -> Compared:
     """Predictions of a record and of its reference run (its noise drawn with ``seed``)."""
-    data = measured(record, model)
-    inner = inner_states(plant, data)
-    runs = predict(model, plant, data, horizon, inner)
+    record = subject.seen(record)
+    data = measured(record, subject.scales)
+    ready = subject.runs(data)
+    runs = predict(subject, ready, data, horizon)
     rng = np.random.default_rng(seed)
     channels = {"drive": record["drive"]}
     for name in ("position", "pressure_a", "pressure_b", "pressure_supply", "spool"):
         if name in record:
             channels[name] = runs.free_run[name] + data.noise[name] * rng.standard_normal(len(record))
     if "spool" in record:
-        channels["spool"] = channels["spool"] * model.value("spool_travel")
-    made = measured(replace(record, channels=channels), model, data.velocity_filter)
+        channels["spool"] = channels["spool"] * subject.scales.spool_travel
+    made = measured(replace(record, channels=channels), subject.scales, data.velocity_filter)
     reference = replace(made, noise=data.noise)
-    return Compared(data, runs, reference, predict(model, plant, reference, horizon, inner))
+    return Compared(data, runs, reference, predict(subject, ready, reference, horizon))

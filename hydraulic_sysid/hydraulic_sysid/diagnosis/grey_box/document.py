@@ -20,7 +20,6 @@ import numpy as np
 from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.arrays import Array, Index
 from hydraulic_sim.model_file import Model
-from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.decimation import trace
 from hydraulic_sysid.data.display import TITLES
 from hydraulic_sysid.data.records import Record
@@ -28,6 +27,7 @@ from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.diagnosis.compare.channels import UNITS
 from hydraulic_sysid.diagnosis.compare.prediction import check
 from hydraulic_sysid.diagnosis.compare.reference_run import Compared, run
+from hydraulic_sysid.diagnosis.compare.subject import ModelSubject
 
 from .selection import FOLDS, Selected, select
 from .terms import Scales, Terms, terms
@@ -74,13 +74,13 @@ def grey_box(
     """
     if not records or not test:
         raise GreyBoxError("a grey box needs records to fit and records (or a part of them) to test on")
-    plant = Plant(model)
+    subject = ModelSubject(model)
     data: list[_Data] = []
     for record in [*records, *test]:
         check(record, horizon)
         if progress is not None:
             progress(record.name)
-        data.append(_data(run(model, plant, record, horizon, seed=len(data))))
+        data.append(_data(run(subject, record, horizon, seed=len(data))))
     if sum(d.time.size for d in data[: len(records)]) * STEP_S < 2 * FOLDS * BLOCK_S:
         raise GreyBoxError(f"the records to fit are too short: {2 * FOLDS * BLOCK_S:g} s are needed beyond the horizon")
     scales = Scales.of([d.signals for d in data[: len(records)]])

@@ -14,7 +14,7 @@ from hydraulic_node_utils import processors
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
-from hydraulic_sysid.diagnosis.compare.document import model_document
+from hydraulic_sysid.diagnosis.compare.subject import model_document
 
 from .attribution import PARAMETERS, Attribution, attribute
 from .balance_statistics import balance_entries, whiteness

@@ -10,8 +10,8 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.diagnosis.compare.channels import Measured, measured
-from hydraulic_sysid.diagnosis.compare.prediction import start
+from hydraulic_sysid.diagnosis.compare.channels import Measured, Scales, measured
+from hydraulic_sysid.diagnosis.compare.subject import start
 
 from .attribution import PARAMETERS
 from .balances import Balances, Residuals
@@ -63,7 +63,7 @@ def record_balances(
 ) -> RecordBalances:
     """Form ``names`` of a record; ``keys`` are the parameters that may move. ``seed`` draws the reference's noise."""
     plant, drive, dt = balances.plant, record["drive"], record.dt
-    data, factor = measured(record, balances.model), decimation_factor(record.dt)
+    data, factor = measured(record, Scales.of(balances.model)), decimation_factor(record.dt)
     filter_ = data.velocity_filter
     free = plant.simulate(drive, dt, start(plant, data))
     errors = sensor_errors(balances.model, plant, free)

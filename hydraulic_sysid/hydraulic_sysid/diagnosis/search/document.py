@@ -8,7 +8,7 @@ from typing import Any
 
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.results import heading
-from hydraulic_sysid.diagnosis.compare.document import model_document
+from hydraulic_sysid.diagnosis.compare.subject import model_document
 
 from . import verdict as verdicts
 from .candidates import subsystem

@@ -11,7 +11,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import save_model
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import Record, RecordError, TimeError, read_records
-from hydraulic_sysid.diagnosis.compare import ComparisonError, compare
+from hydraulic_sysid.diagnosis.compare import ComparisonError, ModelSubject, compare
 from hydraulic_sysid.diagnosis.search import DiagnosisError, diagnose
 from hydraulic_sysid.linear import identification
 from hydraulic_sysid.linear.models import IdentificationError
@@ -87,7 +87,7 @@ def analyse(records: list[Record], test_records: list[Record], model: Model, out
     every = [*records, *test_records]
     steps.begin("compare", 3.0 + 2.0 * len(every))
     try:
-        compared = compare(model, every, progress=lambda _: steps.tick())
+        compared = compare(ModelSubject(model), every, progress=lambda _: steps.tick())
     except ComparisonError as error:
         raise DemoError("compare", str(error), "give records with drive and position that are long enough") from None
     results.write_result(out, compared)

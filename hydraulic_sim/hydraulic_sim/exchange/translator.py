@@ -15,19 +15,24 @@ from typing import Any
 
 from ..errors import EffectError
 
-MATH = {
-    "sqrt": "sqrt", "exp": "exp", "log": "log", "sin": "sin", "cos": "cos", "tan": "tan", "tanh": "tanh", "sinh": "sinh",
-    "cosh": "cosh", "atan": "atan", "atan2": "atan2", "asin": "asin", "acos": "acos", "hypot": "hypot", "floor": "floor",
-    "ceil": "ceil", "copysign": "copysign", "isfinite": "isfinite", "fabs": "fabs", "pow": "pow", "log1p": "log1p",
-    "expm1": "expm1",
-}  # fmt: skip
+MATH = frozenset(
+    {
+        *("sqrt", "exp", "log", "log1p", "expm1", "pow", "hypot", "floor", "ceil", "fabs", "copysign", "isfinite"),
+        *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh"),
+    }
+)
+"""Functions of `math` that C has under the same name."""
 _OPERATORS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
     ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||", ast.USub: "-", ast.UAdd: "+", ast.Not: "!",
 }  # fmt: skip
-_KEYWORDS = set(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while main".split()
+_KEYWORDS = frozenset(
+    word
+    for line in (
+        "auto break case char const continue default do double else enum extern float for goto if inline int long main",
+        "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while",
+    )
+    for word in line.split()
 )
 _WHOLE, _REAL = "long", "double"
 _LARGEST_POWER = 8
@@ -113,7 +118,8 @@ class Translator:
         unused = "".join(f"    (void){c_name(n)};{f' (void)n_{n};' if n in self.f.arrays else ''}\n" for n in kept)
         local = [n for n in self.types if n not in arguments]
         declared = "".join(f"    {self.types[n]} {c_name(n)} = 0; (void){c_name(n)};\n" for n in local)
-        return f"static {kind} {self.f.name}({', '.join(head)})\n{{\n{unused}{declared}" + "\n".join(self.lines) + "\n}\n"
+        body = "\n".join(self.lines)
+        return f"static {kind} {self.f.name}({', '.join(head)})\n{{\n{unused}{declared}{body}\n}}\n"
 
     def fail(self, node: ast.AST, what: str) -> EffectError:
         """The error that something has no translation."""
@@ -393,7 +399,7 @@ class Translator:
         if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name):
             module = self.f.scope.get(node.func.value.id)
             if isinstance(module, ModuleType) and module.__name__ == "math" and node.func.attr in MATH:
-                return f"{MATH[node.func.attr]}({', '.join(self.expression(a) for a in node.args)})"
+                return f"{node.func.attr}({', '.join(self.expression(a) for a in node.args)})"
         if isinstance(node.func, ast.Name):
             arguments = [] if node.func.id == "len" else [self.expression(a) for a in node.args]
             if node.func.id == "len" and isinstance(node.args[0], ast.Name):
@@ -409,7 +415,7 @@ class Translator:
                 for other in arguments[1:]:
                     text = f"{'smaller' if node.func.id == 'min' else 'larger'}({text}, {other})"
                 return text
-        raise self.fail(node, f"the call {ast.unparse(node)!r}; allowed are math, min, max, abs, int and own functions,")
+        raise self.fail(node, f"the call {ast.unparse(node)!r} (allowed: math, min, max, abs, int, own functions)")
 
     def _arguments(self, node: ast.Call, called: Called) -> list[str]:
         found: list[str] = []
@@ -424,8 +430,9 @@ class Translator:
             return [c_name(node.id), self.sizes[node.id]]
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Slice):
             low, high = node.slice.lower, node.slice.upper
-            if isinstance(low, ast.Constant) and isinstance(high, ast.Constant):
-                return [f"{c_name(node.value.id)} + {low.value}", str(int(str(high.value)) - int(str(low.value)))]
+            ends = [e.value for e in (low, high) if isinstance(e, ast.Constant) and isinstance(e.value, int)]
+            if len(ends) == 2:
+                return [f"{c_name(node.value.id)} + {ends[0]}", str(ends[1] - ends[0])]
         raise self.fail(node, f"the array {ast.unparse(node)!r}")
 
 

@@ -42,11 +42,18 @@ def see(now, dt, command, on, P, hydraulic, S, M, Y):
 
 @dataclass(frozen=True)
 class PlantSource:
-    """C of a plant: ``text`` and ``header``, the ``parameters`` that a user may set (key → place in the array), and the rate [Hz]."""
+    """A plant in C.
 
-    text: str
-    header: str
+    ``files``: names and texts; ``parameters``: those of the model, key → place in the plant's array; ``n_parameters``:
+    the length of that array; ``longest_step`` [s] of the integrator; ``initial``: what `INITIAL` begins with [SI];
+    ``rate`` [Hz].
+    """
+
+    files: Mapping[str, str]
     parameters: Mapping[str, int]
+    n_parameters: int
+    longest_step: float
+    initial: tuple[float, ...]
     rate: float
 
 
@@ -75,8 +82,9 @@ def plant_source(model: Model, rate: float) -> PlantSource:
         parts.append(Translator(function).text())
         scope[name] = Called(f"plant_{name}", tuple(a.arg in arrays for a in tree.args.args), returns)
     keys = {key: layout.parameters[key] for key in model.keys()}  # noqa: SIM118, a method of the model
-    text, header = (_framed(f.read_text(encoding="utf-8"), plant, parts, rate) for f in (FRAME, HEADER))
-    return PlantSource(text, header, keys, rate)
+    files = {f.name: _framed(f.read_text(encoding="utf-8"), plant, parts, rate) for f in (FRAME, HEADER)}
+    rest = tuple(float(value) for value in plant.initial_state().states[: len(INITIAL)])
+    return PlantSource(files, keys, len(layout.parameters), plant.longest_step, rest, rate)
 
 
 def _see(layout: compose.Layout) -> str:
@@ -182,7 +190,11 @@ def _framed(frame: str, plant: Plant, parts: list[str], rate: float) -> str:
         "START": "\n".join(start),
         "FUNCTIONS": "\n".join(parts),
     }
+    return filled(frame, values)
+
+
+def filled(frame: str, values: Mapping[str, str]) -> str:
+    """A frame of C with texts in the places ``@NAME@``."""
     for name, text in values.items():
         frame = frame.replace(f"@{name}@", text)
     return frame
-

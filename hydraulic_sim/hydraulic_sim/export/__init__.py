@@ -1,5 +1,0 @@
-"""Models that travel: a composed plant as C without Python, and as a Functional Mock-up Unit (FMI 2.0, co-simulation).
-
-`translator` turns the small part of Python in which effects and the plant's loop are written into C99; `plant_source`
-applies it to the very text that numba compiles; `fmu` adds the interface, compiles and packs.
-"""
