@@ -205,7 +205,8 @@ def test_rate_too_slow_or_too_fast_is_told(tmp_path: Path) -> None:
 def test_effect_that_c_cannot_be_written_of_is_named(tmp_path: Path) -> None:
     file = tmp_path / "odd_friction.py"
     text = Path(viscous_friction.__file__).read_text(encoding="utf-8")
-    text = text.replace("    return -viscosity", "    import numpy\n\n    return -numpy.cbrt(viscosity)")
+    text = text.replace("    return -viscosity", "    return -numpy.cbrt(viscosity)")
+    text = text.replace("from hydraulic_sim.effect", "import numpy\n\nfrom hydraulic_sim.effect")
     file.write_text(text.replace("slot=", 'name="odd_friction", slot='))
     model = load_model("sample_bench").with_effect_file(file).with_effect("odd_friction")
     with pytest.raises(EffectError, match="odd_friction.*cannot be written in C"):

@@ -41,7 +41,9 @@ def main(argv: list[str] | None = None) -> int:
 def _export(options: argparse.Namespace) -> None:
     console = Console(highlight=False)
     model = load_model(options.model)
-    target = cli.new_path(options.fmu or options.c)
+    target: Path = options.fmu or options.c
+    if target.exists():
+        raise cli.UsageError(f"{target} exists; choose another path (nothing is overwritten)")
     if options.fmu:
         made = write_fmu(model, target, options.rate)
         console.print(f"{target}: FMI 2.0 co-simulation, {options.rate:g} Hz, C sources and a binary for {made}"
