@@ -18,6 +18,7 @@ from hydraulic_control.nodes.relay import RelayNode
 from hydraulic_interfaces.contract import SERVICES, TOPICS
 from hydraulic_plant_node.nodes.plant_node import PlantNode
 from hydraulic_sim.nodes.simulator import Simulator
+from hydraulic_sysid.nodes.condition_monitor import ConditionMonitor
 from hydraulic_sysid.nodes.estimator import Estimator
 from hydraulic_sysid.nodes.excitation import ExcitationNode
 from hydraulic_sysid.nodes.recorder import Recorder
@@ -31,6 +32,7 @@ MADE = {
     "relay": RelayNode,
     "excitation": ExcitationNode,
     "estimator": Estimator,
+    "condition_monitor": ConditionMonitor,
     "recorder": Recorder,
 }
 

@@ -279,3 +279,15 @@ def test_value_references_match_the_c_side(made: Path) -> None:
     )  # fmt: skip
     for name in base.OUTPUTS:
         assert found[name][-1] == pytest.approx(truth[name][-1], rel=1e-9, abs=1e-12), name
+
+
+def test_an_effect_of_the_users_own_is_exported_too(tmp_path: Path) -> None:
+    file = Path(__file__).parents[2] / "examples" / "user_effects" / "seal_drag.py"
+    model = load_model("sample_bench").with_effect_file(file).with_effect("seal_drag")
+    write_fmu(model, tmp_path / "own.fmu", RATE)
+    drive = multisine(4.0)
+    truth = Plant(model).simulate(drive, 1.0 / RATE)["position"]
+    without = Plant(load_model("sample_bench")).simulate(drive, 1.0 / RATE)["position"]
+    found = ForeignFmu(tmp_path / "own.fmu").simulate(drive, 1.0 / RATE)["position"]
+    assert np.abs(truth - without).max() > 1e-5  # it matters
+    assert np.abs(found - truth).max() <= 1e-6 * np.ptp(truth)

@@ -17,6 +17,7 @@ CONTROLLER_NODE = "controller"
 REFERENCE_NODE = "reference"
 RELAY_NODE = "relay"
 ESTIMATOR_NODE = "estimator"
+CONDITION_MONITOR_NODE = "condition_monitor"
 
 PISTON = "piston"
 SERVOVALVE = "servovalve"
