@@ -196,7 +196,7 @@ def test_convert(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]) 
     out = tmp_path / "out"
     arguments = ["--record", str(tmp_path / "a.csv"), str(tmp_path / "b.csv"), "--to", kind, "--out", str(out)]
     assert convert.main(arguments) == 0
-    assert "2 records" in capsys.readouterr().out
+    assert "300 samples, every 0.0005 s: command, drive" in capsys.readouterr().out
     found = read_records(out)
     assert [r.name for r in found] == ["a", "b"]
     assert_same(found[1], record(seed=ord("b")))

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hydraulic_node_utils import cli, tables
+from hydraulic_node_utils import cli
 from hydraulic_sysid.data.records import Record, save, to_bag
 from hydraulic_sysid.data.records.formats import FORMATS
 from hydraulic_sysid.verbs import _options as opt
@@ -45,10 +45,8 @@ def _convert(options: argparse.Namespace) -> None:
         for record, target in zip(records, targets, strict=True):
             status.update(f"writing {target} …")
             (to_bag if options.to == BAG else save)(record, target)
-    table = tables.table(f"{len(records)} records", ("|file", ">samples", ">dt [s]", "|channels"))
     for record, target in zip(records, targets, strict=True):
-        table.add_row(str(target), str(len(record)), f"{record.dt:.6g}", ", ".join(record.channels))
-    tables.console().print(table)
+        print(f"{target}: {len(record)} samples, every {record.dt:.6g} s: {', '.join(record.channels)}")
 
 
 def _targets(records: Iterable[Record], folder: Path, suffix: str) -> list[Path]:
