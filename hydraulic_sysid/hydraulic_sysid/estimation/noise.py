@@ -27,6 +27,7 @@ _ORDER = 4
 _BLOCK = 100
 _AROUND = 101  # samples over which the scale of differences is taken
 _MEDIAN = 0.6745  # of normal noise: the median of its size over its standard deviation
+_PART = 1 << 16  # samples at a time: long records would fill the memory
 _STANDS_OUT = 12.0  # standard deviations
 _AGREE = 0.3  # of the distance of a spike from its neighbours: what they may differ by
 
@@ -94,10 +95,13 @@ def spikes(signal: ArrayLike) -> Mask:
     differences are nearby. Fast motion may look alike: whoever has a model looks again.
     """
     y = _checked(signal)
-    beside = np.stack([y[:-4], y[1:-3], y[3:-1], y[4:]])
     off, spread = np.zeros(y.size), np.zeros(y.size)
-    off[2:-2] = np.abs(y[2:-2] - np.median(beside, axis=0))
-    spread[2:-2] = np.ptp(beside, axis=0)
+    for first in range(0, y.size - 4, _PART):
+        part = y[first : first + _PART + 4]
+        beside = np.stack([part[:-4], part[1:-3], part[3:-1], part[4:]])
+        at = slice(first + 2, first + part.size - 2)
+        off[at] = np.abs(y[at] - np.median(beside, axis=0))
+        spread[at] = np.ptp(beside, axis=0)
     scale = np.maximum(median_filter(off, _AROUND), float(np.median(off))) / _MEDIAN
     return (off > _STANDS_OUT * np.maximum(scale, resolution(y))) & (spread < _AGREE * off)
 

@@ -22,6 +22,7 @@ from typing import Any
 from rich.console import Console
 
 from hydraulic_node_utils import cli, tables
+from hydraulic_node_utils.large_arrays import give_back
 from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import Record, read_all
@@ -70,6 +71,7 @@ def run(
     )
 
     def action(options: argparse.Namespace) -> int:
+        give_back()
         folder: Path = options.out
         results.check_target(folder, verb)
         with Console(stderr=True).status(f"{verb} …") as status:

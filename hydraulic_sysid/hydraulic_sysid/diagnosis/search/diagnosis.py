@@ -27,8 +27,9 @@ from .search_state import SearchResult
 from .uncertainty import Known, parameter_errors
 from .worth import HOPELESS
 
-BALANCED = 40.0  # s of all records together of which balances are formed, …
+BALANCED = 40.0  # s of all records together of which balances are formed where they are not attributed, …
 SHORT = 4.0  # … and at least of each
+BALANCED_SAMPLES = 100_000  # of all records together, whatever is done: this bounds the memory
 SAMPLED = 60  # segments that are kept of what is left
 
 
@@ -144,18 +145,19 @@ def _balances(
     """The balances' figures; and, to ``attribute`` them, subsystems by what each explains of them, most first."""
     try:
         if not attribute:
-            return balance_figures(model, _shortened(records)), []
-        found = locate(model, records, maps=False)
+            return balance_figures(model, shortened(records, BALANCED)), []
+        found = locate(model, shortened(records, math.inf), maps=False)
     except (LocateError, SimulationError):
         return [], []
     return found["balances"], [str(s["name"]) for s in found["attribution"]]
 
 
-def _shortened(records: Sequence[Record]) -> list[Record]:
-    """The middle of every record, as long as `BALANCED` asks for."""
-    share = BALANCED / sum(r.duration for r in records)
+def shortened(records: Sequence[Record], seconds: float) -> list[Record]:
+    """The middle of every record: ``seconds`` and `BALANCED_SAMPLES` of all together."""
+    share = min(seconds / sum(r.duration for r in records), BALANCED_SAMPLES / sum(map(len, records)))
     found = []
     for r in records:
-        half = 0.5 * min(max(share * r.duration, SHORT), r.duration)
+        least = min(SHORT, BALANCED_SAMPLES * r.dt / len(records))
+        half = 0.5 * min(max(share * r.duration, least), r.duration)
         found.append(r.window(0.5 * r.duration - half, 0.5 * r.duration + half) if share < 1.0 else r)
     return found

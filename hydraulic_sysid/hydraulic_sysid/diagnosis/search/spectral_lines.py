@@ -23,6 +23,7 @@ _FINER = 4  # zero padding: bins between those of a record
 _BESIDE = 3.0  # Hz, within which side bands of a line lie
 _MOST = 2
 _VISIBLE = 0.3  # of a channel's noise, from which its steps are no mere rounding of a file
+_MOST_BINS = 1_000_000
 _SLOWEST = 2.0  # Hz, slower is drift within a segment
 
 
@@ -85,10 +86,11 @@ def _spectrum(segments: Segments, residual: Array) -> _Spectrum | None:
     sign = np.sign(segments.record["drive"][index])
     way[index - begin] = sign - sign.mean()
     way /= max(float(np.sqrt(np.mean(way**2))), 1e-9)
-    count = next_fast_len(_FINER * len(run), real=True)
+    finer = max(1, min(_FINER, _MOST_BINS // len(run)))  # a long record's own bins are fine enough
+    count = next_fast_len(finer * len(run), real=True)
     frequency: Array = np.fft.rfftfreq(count, segments.record.dt).astype(np.float64)
     plain, turned = _power(run, np.ones_like(way), count), _power(run, way, count)
-    around = np.repeat(np.asarray(median_filter(plain[::_FINER], _AROUND), dtype=float), _FINER)[: len(plain)]
+    around = np.repeat(np.asarray(median_filter(plain[::finer], _AROUND), dtype=float), finer)[: len(plain)]
     within = frequency > _SLOWEST
     floor = np.maximum(around, 1e-300)
     return _Spectrum(frequency, np.where(within, plain / floor, 0.0), np.where(within, (plain + turned) / floor, 0.0))
