@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import xml.etree.ElementTree as Xml
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import fmpy
@@ -267,6 +268,21 @@ def test_what_is_no_fmu_is_refused(tmp_path: Path) -> None:
 def test_foreign_fmu_that_fails_says_why(made: Path) -> None:
     with pytest.raises(ExchangeError, match="whole multiple of 0.001"):
         ForeignFmu(made).simulate(np.zeros(10), 0.0003)
+
+
+def test_the_working_folder_stays(made: Path, tmp_path: Path) -> None:
+    """FMPy changes it while it loads a library, and stays there where that fails."""
+    before, fmu = Path.cwd(), ForeignFmu(made)
+    with ThreadPoolExecutor(4) as pool:
+        runs = list(pool.map(lambda seed: fmu.simulate(multisine(0.2, seed), 1e-3)["position"], [1, 1, 2, 2] * 4))
+    assert Path.cwd() == before
+    assert all(np.array_equal(a, b) for a, b in zip(runs[::2], runs[1::2], strict=True))
+    with zipfile.ZipFile(made) as old, zipfile.ZipFile(tmp_path / "b.fmu", "w") as new:
+        for name in old.namelist():
+            new.writestr(name, b"no library" if name.startswith("binaries") else old.read(name))
+    with pytest.raises(ExchangeError, match="fails"):
+        ForeignFmu(tmp_path / "b.fmu").simulate(np.zeros(5), 1e-3)
+    assert Path.cwd() == before
 
 
 def test_value_references_match_the_c_side(made: Path) -> None:

@@ -10,10 +10,12 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import itertools
+import os
 import shutil
 import tempfile
+import threading
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -138,7 +140,8 @@ class ForeignFmu:
         said = _SAID[name] = []
         given = {k: v for k, v in (initial or {}).items() if k in self._variables}
         try:
-            found = self._run(name, np.asarray(drive, dtype=float), dt, given)
+            with _ONE_AT_A_TIME, _same_folder():
+                found = self._run(name, np.asarray(drive, dtype=float), dt, given)
         except Exception as error:  # FMPy's own, and what the system says of a library that cannot be loaded
             raise ExchangeError(f"{self.path}: the FMU fails ({_line(error)}){_told(said)}") from None
         finally:
@@ -192,6 +195,18 @@ class ForeignFmu:
 _SAID: dict[str, list[str]] = {}
 """What each running FMU, by its instance's name, has said."""
 _NUMBERS = itertools.count()
+_ONE_AT_A_TIME = threading.Lock()
+"""FMUs of others need not bear threads, and FMPy changes the working folder while it loads one."""
+
+
+@contextlib.contextmanager
+def _same_folder() -> Iterator[None]:
+    """Go back to the working folder, which FMPy leaves where a library cannot be loaded."""
+    before = os.getcwd()
+    try:
+        yield
+    finally:
+        os.chdir(before)
 
 
 def _log(_environment: Any, name: bytes | None, _status: int, _category: bytes, message: bytes | None) -> None:
