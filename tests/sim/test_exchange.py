@@ -18,7 +18,7 @@ from fmpy.validation import validate_fmu
 from hydraulic_sim import base
 from hydraulic_sim.effects import viscous_friction
 from hydraulic_sim.errors import EffectError, ExchangeError
-from hydraulic_sim.exchange.fmu import write_fmu
+from hydraulic_sim.exchange.fmu import compiler, write_fmu
 from hydraulic_sim.exchange.foreign import ForeignFmu
 from hydraulic_sim.exchange.plant_source import plant_source
 from hydraulic_sim.model import Model
@@ -27,6 +27,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sim.verbs import export
 
 RATE = 1000.0
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler (cc, gcc or clang) on this machine")
 
 
 def multisine(seconds: float, seed: int = 3) -> np.ndarray:

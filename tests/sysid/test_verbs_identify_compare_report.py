@@ -8,11 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from hydraulic_sim.exchange.fmu import compiler
 from hydraulic_sim.verbs import export
 from hydraulic_sysid.verbs import compare, identify, report
 
 SAMPLE = Path(__file__).parents[2] / "examples" / "sample_bench"
 STEPS = str(SAMPLE / "steps.csv.gz")
+needs_a_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 
 
 def test_compare_writes_document_and_page_and_prints_the_verdict(
@@ -127,6 +129,7 @@ def test_unknown_columns_are_named(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "strange.csv.gz" in capsys.readouterr().err
 
 
+@needs_a_compiler
 def test_an_fmu_is_compared_like_the_model_that_it_comes_from(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -146,6 +149,7 @@ def test_an_fmu_is_compared_like_the_model_that_it_comes_from(
     assert "Describe the actuator in a model file" in page and "hydraulic_sysid diagnose" not in page
 
 
+@needs_a_compiler
 def test_compare_refuses_an_fmu_that_has_no_position(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert export.main(["--model", "sample_bench", "--fmu", str(tmp_path / "a.fmu")]) == 0
     arguments = ["--fmu", str(tmp_path / "a.fmu"), "--record", STEPS, "--out", str(tmp_path / "run")]
