@@ -89,7 +89,19 @@ def test_sources_compile_without_a_warning_and_without_python(tmp_path: Path, ev
     for name, text in plant_source(everything, RATE).files.items():
         assert "Python.h" not in text
         (tmp_path / name).write_text(text)
-    command = ["cc", "-std=c99", "-Wall", "-Wextra", "-O1", "-fPIC", "-shared", "plant.c", "-o", "plant.so", "-lm"]
+    command = [
+        str(compiler()),
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-O1",
+        "-fPIC",
+        "-shared",
+        "plant.c",
+        "-o",
+        "plant.so",
+        "-lm",
+    ]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
