@@ -15,11 +15,13 @@ from hydraulic_sysid.data.records import Record, save
 from hydraulic_sysid.diagnosis.search import diagnosis
 
 PEAK = """
-import resource, sys
+import re, sys
+from pathlib import Path
 from hydraulic_sysid.verbs import diagnose
 code = diagnose.main(sys.argv[1:])
-print(code, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+print(code, re.search(r"VmHWM:\\s*(\\d+) kB", Path("/proc/self/status").read_text())[1])
 """
+"""Exit code and the process's own peak [KiB]; `getrusage` would count its parent's, from before it was a process."""
 
 
 def record(rate: float, seconds: float) -> Record:
