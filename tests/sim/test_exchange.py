@@ -320,3 +320,57 @@ def test_an_effect_of_the_users_own_is_exported_too(tmp_path: Path) -> None:
     found = ForeignFmu(tmp_path / "own.fmu").simulate(drive, 1.0 / RATE)["position"]
     assert np.abs(truth - without).max() > 1e-5  # it matters
     assert np.abs(found - truth).max() <= 1e-6 * np.ptp(truth)
+
+
+PIECE = """
+import math
+
+from hydraulic_sim.effect import Effect, Parameter
+
+STEEP = True
+
+
+def force(velocity, level):
+    count = 3
+    head = 0
+    total = 0
+    for i in range(count):
+        count = 1
+        i += 10
+        head -= 2
+        total += head % 5 + i
+    half = 3
+    half /= 2
+    any_left = 0
+    if velocity > 0.0:
+        any_left = 1
+    return -level * math.tanh(velocity) * (total + half + any_left + STEEP)
+
+
+EFFECT = Effect(
+    name="odd_friction", slot="force", summary="s", kernel=force,
+    parameters=(Parameter("level", "N", 20.0, (0.0, 1e6), "d", "s", null=0.0),),
+    equation="e", source="s", excited_by="x", confused_with=("viscous_friction",), distinguished_by="y",
+)
+"""
+
+
+def test_what_python_and_c_do_otherwise_is_done_as_in_python(tmp_path: Path) -> None:
+    """A loop's bound and counter, remainders of negative numbers, division of whole ones, a flag that changes."""
+    (tmp_path / "odd_friction.py").write_text(PIECE)
+    model = load_model("sample_bench").with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
+    write_fmu(model, tmp_path / "odd.fmu", RATE)
+    drive = multisine(3.0)
+    truth = Plant(model).simulate(drive, 1.0 / RATE)["position"]
+    without = Plant(load_model("sample_bench")).simulate(drive, 1.0 / RATE)["position"]
+    found = ForeignFmu(tmp_path / "odd.fmu").simulate(drive, 1.0 / RATE)["position"]
+    assert np.abs(truth - without).max() > 1e-5
+    assert np.abs(found - truth).max() <= 1e-9 * np.ptp(truth)
+
+
+def test_a_loop_with_an_else_is_refused(tmp_path: Path) -> None:
+    looped = "    while head > 9:\n        head -= 1\n    else:\n        head = 4\n    half = 3\n"
+    (tmp_path / "odd_friction.py").write_text(PIECE.replace("    half = 3\n", looped))
+    model = load_model("sample_bench").with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
+    with pytest.raises(EffectError, match="While cannot be written in C"):
+        plant_source(model, RATE)

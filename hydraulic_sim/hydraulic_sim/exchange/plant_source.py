@@ -5,10 +5,9 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from .. import base, compose, kernels, slots
@@ -16,10 +15,11 @@ from ..effect import Effect
 from ..errors import EffectError
 from ..model import Model
 from ..plant import Plant
-from .translator import Called, Function, Translator, arrays_of, number, tree_of
+from .translator import BUILTINS, Called, Function, Translator, arrays_of, number, tree_of
 
 FRAME, HEADER = (Path(__file__).with_name(name) for name in ("plant.c", "plant.h"))
-INITIAL = ("position", "velocity", "pressure_a", "pressure_b")
+INITIAL = tuple(s.name for s in base.STATES if s.kind == "rate")
+"""The states that a run of C can begin with."""
 _WHOLE = frozenset({"hydraulic"})
 
 SEE = """
@@ -69,30 +69,27 @@ def plant_source(model: Model, rate: float) -> PlantSource:
     active = [e for e in layout.library.values() if e.name in model.effects or e.always_on]
     names = {e.name for e in active}
     known = {f"on[{i}]": float(name in names) for name, i in layout.effects.items()}
-    known |= {"on[]": 0.0, "hydraulic": float(model.kind == "hydraulic")}
+    known["hydraulic"] = float(model.kind == "hydraulic")
     scope, parts = _functions(active)
     scope |= {"NX": len(layout.states), "NR": layout.n_rates}
     module = compose.write_module(layout.library)
     for name, text in (("relax", module), ("run", module), ("see", _see(layout))):
         result = "long" if name == "run" else "double"
         tree = tree_of(text, name)
-        arrays = arrays_of(tree, _lookup(scope))
+        arrays = arrays_of(tree, scope)
         returns = 0 if name == "see" else 1
         function = Function(f"plant_{name}", tree, scope, "the plant", known, arrays, _WHOLE, returns, result)
         parts.append(Translator(function).text())
         scope[name] = Called(f"plant_{name}", tuple(a.arg in arrays for a in tree.args.args), returns)
     keys = {key: layout.parameters[key] for key in model.keys()}  # noqa: SIM118, a method of the model
-    files = {f.name: _framed(f.read_text(encoding="utf-8"), plant, parts, rate) for f in (FRAME, HEADER)}
     rest = tuple(float(value) for value in plant.initial_state().states[: len(INITIAL)])
+    values = _places(plant, parts, rest, rate)
+    files = {f.name: filled(f.read_text(encoding="utf-8"), values) for f in (FRAME, HEADER)}
     return PlantSource(files, keys, len(layout.parameters), plant.longest_step, rest, rate)
 
 
 def _see(layout: compose.Layout) -> str:
     return compose.fill(SEE, **compose.places(layout))
-
-
-def _lookup(scope: Mapping[str, Any]) -> Callable[[str], Called | None]:
-    return lambda name: scope[name] if isinstance(scope.get(name), Called) else None
 
 
 def _functions(active: list[Effect]) -> tuple[dict[str, Any], list[str]]:
@@ -121,8 +118,9 @@ def _plain(function: Any) -> Any:
 
 
 def _translated(
-    function: Any, name: str, returns: int, shared: dict[int, Called], parts: list[str], where: str
+    function: Any, name: str, returns: int | None, shared: dict[int, Called], parts: list[str], where: str
 ) -> Called:
+    """A function and those that it calls, put among the ``parts``; ``returns`` None: as its text says."""
     plain = _plain(function)
     if id(plain) in shared:
         return shared[id(plain)]
@@ -136,37 +134,31 @@ def _translated(
     scope: dict[str, Any] = {**plain.__globals__, **inspect.getclosurevars(plain).nonlocals}
     for called in _called(tree):
         other = scope.get(called)
-        if callable(other) and not isinstance(other, ModuleType) and callable(_plain(other)) and called not in _OWN:
-            several = _returns(_plain(other))
-            scope[called] = _translated(other, f"{name}_{called}", several, shared, parts, where)
-    arrays = arrays_of(tree, _lookup(scope))
+        if callable(other):
+            scope[called] = _translated(other, f"{name}_{called}", None, shared, parts, where)
+    arrays, returns = arrays_of(tree, scope), _returns(tree) if returns is None else returns
     parts.append(Translator(Function(name, tree, scope, where, {}, arrays, frozenset(), returns)).text())
     found = Called(name, tuple(a.arg in arrays for a in tree.args.args), returns)
     shared[id(plain)] = found
     return found
 
 
-_OWN = frozenset({"min", "max", "abs", "int", "float", "len", "range"})
-
-
 def _called(tree: ast.FunctionDef) -> Iterator[str]:
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id not in _OWN:
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id not in BUILTINS:
             yield node.func.id
 
 
-def _returns(function: Any) -> int:
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+def _returns(tree: ast.FunctionDef) -> int:
     for node in ast.walk(tree):
         if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
             return len(node.value.elts)
     return 1
 
 
-def _framed(frame: str, plant: Plant, parts: list[str], rate: float) -> str:
-    """The frame with sizes, values and functions in their places."""
+def _places(plant: Plant, parts: list[str], rest: tuple[float, ...], rate: float) -> dict[str, str]:
+    """Sizes, values and functions for their places in the frames."""
     layout = plant.layout
-    rest = plant.initial_state()
     start = []
     for key, record in layout.state_records.items():
         place, value = layout.states[key], record.initial
@@ -175,7 +167,7 @@ def _framed(frame: str, plant: Plant, parts: list[str], rate: float) -> str:
         else:
             text = f"plant->p[{layout.parameters[value]}]" if isinstance(value, str) else number(float(value))
         start.append(f"    plant->x[{place}] = {text};")
-    values = {
+    return {
         "N_PARAMETERS": str(len(layout.parameters)),
         "N_STATES": str(len(layout.states)),
         "N_MEMORY": str(max(layout.n_memory, 1)),
@@ -186,11 +178,10 @@ def _framed(frame: str, plant: Plant, parts: list[str], rate: float) -> str:
         "TURN": number(plant.embedded().turn),
         "DRIVE_LIMIT": str(layout.parameters["drive_limit"]),
         "DEFAULTS": ", ".join(number(plant.value(key)) for key in layout.parameters),
-        "INITIAL": ", ".join(number(float(v)) for v in rest.states[:4]),
+        "INITIAL": ", ".join(map(number, rest)),
         "START": "\n".join(start),
         "FUNCTIONS": "\n".join(parts),
     }
-    return filled(frame, values)
 
 
 def filled(frame: str, values: Mapping[str, str]) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
@@ -34,6 +34,7 @@ _KEYWORDS = frozenset(
     )
     for word in line.split()
 )
+BUILTINS = frozenset({"min", "max", "abs", "int", "float", "len", "range"})
 _WHOLE, _REAL = "long", "double"
 _LARGEST_POWER = 8
 
@@ -43,7 +44,7 @@ class Function:
     """A function to translate: its tree, the name that it has in C, and what its free names mean.
 
     ``scope`` gives numbers, modules, and the C names of other functions as `Called`. ``arrays`` are the arguments that
-    are arrays, ``known`` names and elements with a value that is known (``on[3]`` → 1).
+    are arrays, ``known`` arguments or elements of them whose value is known (``on[3]`` → 1) and which C does not take.
     """
 
     name: str
@@ -64,8 +65,6 @@ class Called:
     name: str
     arrays: tuple[bool, ...]
     returns: int
-    dropped: frozenset[int] = frozenset()
-    result: str = _REAL
 
 
 def c_name(name: str) -> str:
@@ -76,7 +75,7 @@ def c_name(name: str) -> str:
 def number(value: float) -> str:
     """A number as C writes it, every digit kept."""
     if isinstance(value, int):
-        return str(value)
+        return str(int(value))  # True is 1
     if not math.isfinite(value):
         return "INFINITY" if value > 0 else "-INFINITY" if value < 0 else "NAN"
     return repr(float(value))
@@ -92,12 +91,13 @@ class Translator:
         self.known: dict[str, float] = dict(function.known)
         self.lines: list[str] = []
         self.depth = 1
-        self.fresh = 0
+        self.once = _assigned_once(function.tree)
 
     def text(self) -> str:
         """The function in C."""
         names = [a.arg for a in self.f.tree.args.args]
-        kept = [n for n in names if n not in self.known and f"{n}[]" not in self.known]
+        known = {key.partition("[")[0] for key in self.known}
+        kept = [n for n in names if n not in known]
         for name in kept:
             if name in self.f.arrays:
                 self.sizes[name] = f"n_{name}"
@@ -134,7 +134,7 @@ class Translator:
                     for target in one.targets:
                         self._assigned(target, one.value)
                 elif isinstance(one, ast.AugAssign) and isinstance(one.target, ast.Name):
-                    self._join(one.target.id, self._type(one.value))
+                    self._join(one.target.id, _REAL if isinstance(one.op, ast.Div) else self._type(one.value))
                 elif isinstance(one, ast.For) and isinstance(one.target, ast.Name):
                     self._join(one.target.id, _WHOLE)
 
@@ -209,7 +209,7 @@ class Translator:
             self._return(node)
         elif isinstance(node, ast.If):
             self._if(node)
-        elif isinstance(node, ast.While):
+        elif isinstance(node, ast.While) and not node.orelse:
             self._line(f"while ({self.expression(node.test)}) {{")
             self._nested(node.body)
             self._line("}")
@@ -239,9 +239,10 @@ class Translator:
         if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"
                 and len(call.args) in (1, 2) and isinstance(node.target, ast.Name) and not node.orelse):  # fmt: skip
             raise self.fail(node, "a loop over something else than range")
-        name = c_name(node.target.id)
         low = "0" if len(call.args) == 1 else self.expression(call.args[0])
-        self._line(f"for ({name} = {low}; {name} < {self.expression(call.args[-1])}; {name}++) {{")
+        # As in Python, the body changes neither how often it runs nor what comes next.
+        self._line(f"for (long next_ = {low}, end_ = {self.expression(call.args[-1])}; next_ < end_; next_++) {{")
+        self._line(f"    {c_name(node.target.id)} = next_;")
         self._nested(node.body)
         self._line("}")
 
@@ -255,7 +256,7 @@ class Translator:
                 self._line(f"double {c_name(target.id)}[{size}] = {{0}};")
                 return
             folded = self.constant(value)
-            if folded is not None and target.id.startswith("any_"):
+            if folded is not None and target.id in self.once:
                 self.known[target.id] = folded
                 return
         self._line(f"{self.place(target)} = {self.expression(value)};")
@@ -377,7 +378,7 @@ class Translator:
             return f"pow({left}, {right})"
         if isinstance(node.op, ast.Mod):
             whole = self._type(node.left) == self._type(node.right) == _WHOLE
-            return f"({left} % {right})" if whole else f"modulo({left}, {right})"
+            return f"{'whole_' if whole else ''}modulo({left}, {right})"
         if isinstance(node.op, ast.Div):
             return f"({left} / (double){right})"
         if type(node.op) not in _OPERATORS:
@@ -419,9 +420,7 @@ class Translator:
 
     def _arguments(self, node: ast.Call, called: Called) -> list[str]:
         found: list[str] = []
-        for i, (argument, is_array) in enumerate(zip(node.args, called.arrays, strict=True)):
-            if i in called.dropped:
-                continue
+        for argument, is_array in zip(node.args, called.arrays, strict=True):
             found += self._array(argument) if is_array else [self.expression(argument)]
         return found
 
@@ -436,6 +435,12 @@ class Translator:
         raise self.fail(node, f"the array {ast.unparse(node)!r}")
 
 
+def _assigned_once(tree: ast.FunctionDef) -> frozenset[str]:
+    """Names that are set in one place only, and are no arguments."""
+    stored = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    return frozenset(n for n in stored if stored.count(n) == 1) - {a.arg for a in tree.args.args}
+
+
 def tree_of(text: str, name: str) -> ast.FunctionDef:
     """The definition of a function in a text."""
     for node in ast.walk(ast.parse(text)):
@@ -444,7 +449,7 @@ def tree_of(text: str, name: str) -> ast.FunctionDef:
     raise EffectError(f"no function {name} in the text")
 
 
-def arrays_of(tree: ast.FunctionDef, calls: Callable[[str], Called | None]) -> frozenset[str]:
+def arrays_of(tree: ast.FunctionDef, scope: Mapping[str, Any]) -> frozenset[str]:
     """Arguments that are arrays: those with an index or a length, or that are handed on as arrays."""
     names = {a.arg for a in tree.args.args}
     found = set()
@@ -452,10 +457,10 @@ def arrays_of(tree: ast.FunctionDef, calls: Callable[[str], Called | None]) -> f
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
             found.add(node.value.id)
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            called = calls(node.func.id)
+            called = scope.get(node.func.id)
             if node.func.id == "len" and isinstance(node.args[0], ast.Name):
                 found.add(node.args[0].id)
-            for argument, is_array in zip(node.args, called.arrays if called else (), strict=False):
+            for argument, is_array in zip(node.args, called.arrays if isinstance(called, Called) else (), strict=False):
                 if is_array and isinstance(argument, ast.Name):
                     found.add(argument.id)
     return frozenset(found & names)
