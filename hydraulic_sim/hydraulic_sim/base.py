@@ -83,8 +83,9 @@ def dry_friction_rate(level: float, p: Mapping[str, float]) -> float:
     return max(math.sqrt(stiffness), stiffness * abs(p["bristle_time"]))
 
 
-OUTPUTS = (
-    "position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool",
-    "true_position", "true_pressure_a", "true_pressure_b", "opening",
-)  # fmt: skip
+OUTPUT_UNITS = {
+    "position": "m", "velocity": "m/s", "pressure_a": "Pa", "pressure_b": "Pa", "pressure_supply": "Pa", "spool": "1",
+    "true_position": "m", "true_pressure_a": "Pa", "true_pressure_b": "Pa", "opening": "1",
+}  # fmt: skip
+OUTPUTS = tuple(OUTPUT_UNITS)
 """Columns of a simulation. position and pressures are what the sensors say, the ``true_`` ones the states."""

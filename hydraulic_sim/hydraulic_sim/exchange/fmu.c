@@ -259,23 +259,21 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueR
     return absent(c, "directional derivative");
 }
 
-EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
-{
-    (void)c, (void)kind, (void)value;
-    return fmi2Discard; /* no step is ever pending */
-}
+#define NO_STATUS_OF(NAME, TYPE) /* no step is ever pending */                                    \
+    EXPORT fmi2Status fmi2Get##NAME(fmi2Component c, const fmi2StatusKind kind, TYPE *value)     \
+    {                                                                                            \
+        (void)c, (void)kind, (void)value;                                                        \
+        return fmi2Discard;                                                                      \
+    }
+NO_STATUS_OF(Status, fmi2Status)
+NO_STATUS_OF(IntegerStatus, fmi2Integer)
+NO_STATUS_OF(StringStatus, fmi2String)
 
 EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
     if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
     *value = ((instance_t *)c)->state.plant.time;
     return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
-{
-    (void)c, (void)kind, (void)value;
-    return fmi2Discard;
 }
 
 EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
@@ -285,18 +283,17 @@ EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kin
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
+static fmi2Status keep(instance_t *of, fmi2FMUstate *state, const void *from)
 {
-    (void)c, (void)kind, (void)value;
-    return fmi2Discard;
+    if (!*state) *state = malloc(sizeof(state_t));
+    if (!*state) return absent(of, "memory for its state");
+    memcpy(*state, from, sizeof(state_t));
+    return fmi2OK;
 }
 
 EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    if (!*state) *state = malloc(sizeof(state_t));
-    if (!*state) return absent(c, "memory for its state");
-    memcpy(*state, &((instance_t *)c)->state, sizeof(state_t));
-    return fmi2OK;
+    return keep(c, state, &((instance_t *)c)->state);
 }
 
 EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
@@ -332,8 +329,5 @@ EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi
 EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
     if (size != sizeof(state_t)) return absent(c, "state of that many bytes");
-    if (!*state) *state = malloc(sizeof(state_t));
-    if (!*state) return absent(c, "memory for its state");
-    memcpy(*state, bytes, sizeof(state_t));
-    return fmi2OK;
+    return keep(c, state, bytes);
 }

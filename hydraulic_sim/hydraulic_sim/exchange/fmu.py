@@ -31,7 +31,6 @@ WRAPPER = Path(__file__).with_name("fmu.c")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 PLATFORMS = {"linux": "linux", "darwin": "darwin", "win32": "win"}
 EXTENSIONS = {"linux": ".so", "darwin": ".dylib", "win32": ".dll"}
-UNITS_OF_OUTPUTS = {"pressure": "Pa", "position": "m", "velocity": "m/s", "spool": "1", "opening": "1"}
 _LARGEST = 1e30
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -52,14 +51,12 @@ def variables(model: Model, source: PlantSource) -> Iterator[tuple[int, Variable
     """Value references and variables of a model's FMU: drive, outputs, initial values, longest step, parameters."""
     yield 0, Variable("drive", "V", "held over each sample; saturates at drive_limit", "input", 0.0)
     at = 1
-    for name in base.OUTPUTS:
-        unit = next(u for part, u in UNITS_OF_OUTPUTS.items() if part in name)
+    for name, unit in base.OUTPUT_UNITS.items():
         what = "as its sensor reads it" if f"true_{name}" in base.OUTPUTS else "the plant's own"
         yield at, Variable(name, unit, what, "output")
         at += 1
     for name, start in zip(INITIAL, source.initial, strict=True):
-        unit = next(u for part, u in UNITS_OF_OUTPUTS.items() if part in name)
-        yield at, Variable(f"initial.{name}", unit, "at the start", "parameter", start)
+        yield at, Variable(f"initial.{name}", base.OUTPUT_UNITS[name], "at the start", "parameter", start)
         at += 1
     what = "of the integrator; shorten it where parameters are made stiffer"
     yield at, Variable("longest_step", "s", what, "parameter", source.longest_step, (1e-9, 1.0))
@@ -112,7 +109,7 @@ def _identifier(model: Model) -> str:
 
 
 def _wrapper(source: PlantSource, known: dict[int, Variable], guid: str) -> str:
-    length = max((1 + len(base.OUTPUTS) + len(INITIAL) + 1 + source.n_parameters, *known))
+    length = 1 + len(base.OUTPUTS) + len(INITIAL) + 1 + source.n_parameters
     bounds = [known[i].bounds if i in known else (0.0, -1.0) for i in range(length)]  # none: cannot be set
     values = {
         "GUID": guid,

@@ -24,19 +24,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import base
 from ..arrays import Array
 from ..errors import ExchangeError, ModelError
 from ..units import conversion
+from .plant_source import INITIAL
 
 DRIVE = "drive"
 CHANNELS = {
-    "position": "m", "velocity": "m/s", "pressure_a": "Pa", "pressure_b": "Pa", "pressure_supply": "Pa", "spool": "1",
-}  # fmt: skip
+    name: base.OUTPUT_UNITS[name]
+    for name in ("position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool")
+}
 """Channels that an FMU can have as outputs, with the unit that they take here."""
 PARAMETERS = {
-    "initial.position": "m", "initial.velocity": "m/s", "initial.pressure_a": "Pa", "initial.pressure_b": "Pa",
-    "piston_area_a": "m^2", "piston_area_b": "m^2", "spool_travel": "m",
-}  # fmt: skip
+    **{f"initial.{name}": base.OUTPUT_UNITS[name] for name in INITIAL},
+    **{p.name: p.unit for p in base.PARAMETERS if p.name in ("piston_area_a", "piston_area_b", "spool_travel")},
+}
 """Parameters of an FMU that a comparison uses where it has them."""
 KEYS = {DRIVE: "V", **CHANNELS, **PARAMETERS}
 _SHOWN = 12
@@ -64,7 +67,6 @@ class ForeignFmu:
         import fmpy  # takes long to import
 
         self.path = path
-        self._fmpy = fmpy
         try:
             self._known = fmpy.read_model_description(str(path))
         except Exception as error:  # FMPy raises whatever its parsers do

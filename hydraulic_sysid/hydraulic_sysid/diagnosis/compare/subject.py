@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from hydraulic_sim.arrays import Array, Index
+from hydraulic_sim.exchange.foreign import CHANNELS
 from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model_file import Model
 from hydraulic_sim.plant import Plant, PlantState
@@ -15,7 +16,6 @@ from hydraulic_sysid.data.records import Record
 
 from .channels import Measured, Scales
 
-SENSED = ("position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool")
 _SMOOTHING = 7  # samples; a quadratic over them keeps motion to a quarter of the sampling frequency
 
 
@@ -76,7 +76,7 @@ class PlantRuns:
     def free(self, data: Measured) -> dict[str, Array]:
         """The plant over the whole drive."""
         run = self.plant.simulate(data.record["drive"], data.record.dt, start(self.plant, data))
-        return {name: run[name] for name in SENSED}
+        return {name: run[name] for name in CHANNELS}
 
     def ahead(self, data: Measured, starts: Index, count: int, smoothed: bool) -> dict[str, Array]:
         """Each run begins with what is measured, all else of the free run."""
@@ -84,7 +84,7 @@ class PlantRuns:
         for name, measurement in start_values(data, smoothed).items():
             states[:, self.plant.state_names.index(name)] = measurement[starts]
         runs = self.plant.predict(data.record["drive"], data.record.dt, starts, count, states)
-        return {name: runs[name] for name in SENSED}
+        return {name: runs[name] for name in CHANNELS}
 
 
 def start(plant: Plant, data: Measured) -> PlantState:
