@@ -34,6 +34,7 @@ from hydraulic_can_driver.bus import (
 from hydraulic_can_driver.codec import raw_range
 from hydraulic_can_driver.eds_check import check_against_eds
 from hydraulic_can_driver.errors import BusFileError
+from hydraulic_interfaces.errors import one_line
 from hydraulic_node_utils.yaml_text import load_yaml
 from hydraulic_plant_node.travel_limits import EndsOfTravel
 
@@ -64,7 +65,7 @@ def load_bus(name: str | Path) -> Bus:
     except (OSError, UnicodeDecodeError) as error:
         raise BusFileError(f"{path}: cannot be read ({error}); shipped are {', '.join(shipped())}") from None
     except YAMLError as error:
-        raise BusFileError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+        raise BusFileError(f"{path}: not YAML: {one_line(error)}") from None
     top = _Section(path, document, "the bus")
     found = top.take("format", str)
     if found != FORMAT:

@@ -24,6 +24,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.representer import RepresenterError
 
+from hydraulic_interfaces.errors import one_line
 from hydraulic_node_utils.whole_file import write_text
 from hydraulic_node_utils.yaml_text import load_yaml
 
@@ -64,7 +65,7 @@ def load_model(source: str | Path) -> Model:
         line = error.problem_mark.line + 1 if error.problem_mark else 0
         raise ModelError(f"{path}:{line}: not valid YAML: {error.problem}") from None
     except YAMLError as error:
-        raise ModelError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
+        raise ModelError(f"{path}: not valid YAML: {one_line(error)}") from None
     except UnicodeDecodeError:
         raise ModelError(f"{path}: not a text file in UTF-8") from None
     return _Reader(path, document).model()

@@ -212,3 +212,12 @@ def test_convert_writes_nothing_where_names_collide(tmp_path: Path, capsys: pyte
     assert convert.main(arguments) == 2
     assert "several records would become" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_what_others_call_description_is_no_error(tmp_path: Path) -> None:
+    t = np.arange(50) * 1e-3
+    for text in ("second rig", '{"notes": 5}', "[1]", "{"):
+        with h5py.File(tmp_path / "log.h5", "w") as file:
+            file["time_s"], file["drive_V"] = t, t
+            file.attrs["description"] = text
+        assert read_records(tmp_path / "log.h5")[0].notes == []

@@ -24,6 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hydraulic_interfaces.errors import one_line
+
 from .. import base
 from ..arrays import Array
 from ..errors import ExchangeError, ModelError
@@ -42,7 +44,7 @@ PARAMETERS = {
 }
 """Parameters of an FMU that a comparison uses where it has them."""
 KEYS = {DRIVE: "V", **CHANNELS, **PARAMETERS}
-_SHOWN = 12
+_SHOWN, _LONGEST = 12, 300  # variables that a message lists, characters of a library's error in it
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class ForeignFmu:
         try:
             self._known = fmpy.read_model_description(str(path))
         except Exception as error:  # FMPy raises whatever its parsers do
-            raise ExchangeError(f"{path}: no FMU that can be read ({_line(error)})") from None
+            raise ExchangeError(f"{path}: no FMU that can be read ({one_line(error, _LONGEST)})") from None
         if self._known.fmiVersion != "2.0" or self._known.coSimulation is None:
             kind = "model exchange alone" if self._known.coSimulation is None else f"FMI {self._known.fmiVersion}"
             raise ExchangeError(f"{path}: is of {kind}; FMI 2.0 for co-simulation can be run")
@@ -89,7 +91,7 @@ class ForeignFmu:
         try:
             fmpy.extract(str(path), unzipdir=self._folder)
         except Exception as error:
-            raise ExchangeError(f"{path}: cannot be unpacked ({_line(error)})") from None
+            raise ExchangeError(f"{path}: cannot be unpacked ({one_line(error, _LONGEST)})") from None
 
     def _found(self, names: Mapping[str, str]) -> dict[str, _Variable]:
         unknown = sorted(set(names) - set(KEYS))
@@ -145,7 +147,7 @@ class ForeignFmu:
             with _ONE_AT_A_TIME, _same_folder():
                 found = self._run(name, np.asarray(drive, dtype=float), dt, given)
         except Exception as error:  # FMPy's own, and what the system says of a library that cannot be loaded
-            raise ExchangeError(f"{self.path}: the FMU fails ({_line(error)}){_told(said)}") from None
+            raise ExchangeError(f"{self.path}: the FMU fails ({one_line(error, _LONGEST)}){_told(said)}") from None
         finally:
             del _SAID[name]
         if not np.isfinite(found).all():
@@ -240,7 +242,3 @@ def _callbacks() -> Any:
 
 def _told(said: list[str]) -> str:
     return f"; it says: {' / '.join(said[-3:])}" if said else ""
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())[:300] or type(error).__name__

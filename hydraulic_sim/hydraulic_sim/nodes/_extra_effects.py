@@ -5,6 +5,7 @@ from __future__ import annotations
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from hydraulic_interfaces.errors import one_line
 from hydraulic_node_utils.yaml_text import load_yaml
 from hydraulic_plant_node.plant_backend import BackendError
 from hydraulic_sim.model import Model
@@ -36,7 +37,7 @@ def extra_effects(text: str) -> dict[str, dict[str, float]]:
     try:
         document = load_yaml(YAML(typ="safe"), text) if text.strip() else {}
     except YAMLError as error:
-        raise BackendError(f"extra_effects is no YAML: {' '.join(str(error).split())}") from None
+        raise BackendError(f"extra_effects is no YAML: {one_line(error)}") from None
     if isinstance(document, str):
         document = {document: None}
     if not isinstance(document, dict):

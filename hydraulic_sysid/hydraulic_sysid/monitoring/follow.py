@@ -5,7 +5,6 @@ A process of its own, at low priority and with one thread: fitting bags must not
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -16,8 +15,9 @@ from glob import glob
 from pathlib import Path
 from typing import Any
 
+from hydraulic_node_utils.json_file import read_json
 from hydraulic_sysid.data.bag.metadata import FILE_NAME
-from hydraulic_sysid.data.errors import FileError
+from hydraulic_sysid.data.errors import FileError, RecordError
 
 DOCUMENT, LOG = "monitor.json", "monitor.log"
 
@@ -89,11 +89,10 @@ class Follower:
 
     def _ended(self, code: int) -> dict[str, Any] | None:
         if code in (0, 1):  # 1: something has changed
+            self.problem = ""
             try:
-                found = json.loads((self._folder / DOCUMENT).read_text(encoding="utf-8"))
-                self.problem = ""
-                return found if isinstance(found, dict) else None
-            except (OSError, ValueError) as error:
+                return dict(read_json(self._folder / DOCUMENT, RecordError))
+            except RecordError as error:
                 self.problem = str(error)
                 return None
         said = (self._folder / LOG).read_text(encoding="utf-8", errors="replace").strip()

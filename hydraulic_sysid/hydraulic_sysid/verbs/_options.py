@@ -26,6 +26,7 @@ from hydraulic_node_utils.large_arrays import give_back
 from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import Record, read_all
+from hydraulic_sysid.data.records.formats import SUFFIXES
 
 MODEL = "model.yaml"
 Say = Callable[[str], None]
@@ -123,12 +124,12 @@ def add_record_options(parser: argparse.ArgumentParser, *, required: bool = True
         action="extend",
         required=required,
         default=None if required else [],
-        help="record to read: bag folder, .csv, .csv.gz, .mat, or a folder of such",
+        help=f"record to read: a bag, a table ({', '.join(SUFFIXES)}), or a folder of such",
     )
     parser.add_argument(
         "--columns",
         metavar="MAP",
-        help="column map of CSV and MAT records: a YAML file or the name of a map that is shipped",
+        help="column map of records that are tables: a YAML file or the name of a map that is shipped",
     )
     if window:
         parser.add_argument(

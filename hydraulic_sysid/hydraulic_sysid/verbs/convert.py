@@ -16,7 +16,7 @@ from rich.console import Console
 
 from hydraulic_node_utils import cli
 from hydraulic_sysid.data.records import Record, save, to_bag
-from hydraulic_sysid.data.records.formats import FORMATS
+from hydraulic_sysid.data.records.formats import SUFFIXES
 from hydraulic_sysid.verbs import _options as opt
 
 EPILOG = """\
@@ -25,7 +25,7 @@ examples:
   python -m hydraulic_sysid convert --record logs --columns my_map.yaml --to bag --out bags
 """
 BAG = "bag"
-KINDS = (*(suffix[1:] for module in FORMATS for suffix in module.SUFFIXES), BAG)
+KINDS = (*(suffix[1:] for suffix in SUFFIXES), BAG)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -58,7 +58,5 @@ def _targets(records: Iterable[Record], folder: Path, suffix: str) -> list[Path]
     twice = [str(target) for target, count in Counter(targets).items() if count > 1]
     if twice:
         raise cli.UsageError(f"several records would become {twice[0]}; convert them into folders of their own")
-    for target in targets:
-        if target.exists():
-            raise cli.UsageError(f"{target} exists; choose another folder (a record is never written over another)")
+    opt.check_new(folder, *(target.name for target in targets), what="record")
     return targets

@@ -48,7 +48,7 @@ def main(argv: list[str] | None = None) -> int:
         "units", metavar="UNITS", type=Path, help="units with their records (.yaml), or estimates (.csv)"
     )
     parser.add_argument("--model", metavar="FILE", help="model file of the units, or a preset; for records")
-    parser.add_argument("--columns", metavar="MAP", help="column map of CSV and MAT records")
+    parser.add_argument("--columns", metavar="MAP", help="column map of records that are tables")
     parser.add_argument(
         "--watch", metavar="NAME", nargs="+", default=[],
         help="effects or parameters to compare (default: the effects that grow with wear)",

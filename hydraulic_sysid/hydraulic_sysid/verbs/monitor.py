@@ -20,6 +20,7 @@ from hydraulic_sim.units import to_si
 from hydraulic_sysid import campaign
 from hydraulic_sysid.campaign.manifest import record_groups
 from hydraulic_sysid.data.display import quantity
+from hydraulic_sysid.data.records.formats import suffix_of
 from hydraulic_sysid.monitoring import document, estimates
 from hydraulic_sysid.verbs import _options as opt
 from hydraulic_sysid.verbs._campaign_options import add_crew_options, chosen_crew
@@ -57,7 +58,7 @@ def _add_bag_options(parser: argparse.ArgumentParser) -> None:
         "--record", metavar="PATTERN", nargs="+", required=True,
         help="bags, in the order of their times or else of their names; each match of a pattern is one",
     )  # fmt: skip
-    parser.add_argument("--columns", metavar="MAP", help="column map of CSV and MAT records")
+    parser.add_argument("--columns", metavar="MAP", help="column map of records that are tables")
     parser.add_argument(
         "--watch", metavar="NAME", nargs="+", default=[],
         help="effects or parameters to follow (default: the effects that grow with wear)",
@@ -86,7 +87,7 @@ def _monitor(options: argparse.Namespace, say: opt.Say) -> opt.Done:
 
 
 def _short(name: str) -> str:
-    return name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mat")
+    return name.removesuffix(suffix_of(Path(name)))
 
 
 def _limits(texts: list[str], model: Model, keys: list[str]) -> dict[str, float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hydraulic_interfaces.contract import NAMESPACE, find_topic, topic
+from hydraulic_interfaces.errors import one_line
 from hydraulic_sysid.data.bag.metadata import FILE_NAME
 from hydraulic_sysid.data.errors import BagError
 
@@ -72,9 +73,9 @@ def read(path: Path, names: Iterable[str]) -> Bag:
     except BagError:
         raise
     except Exception as error:  # of a damaged file the library lets through struct, zstd and other errors
-        text = " ".join(str(error).split())
         hint = f"python -m hydraulic_sysid recover {path}"
-        raise BagError(path, f"the bag is cut off or damaged ({text}); save what is there with: {hint}") from None
+        text = f"the bag is cut off or damaged ({one_line(error)}); save what is there with: {hint}"
+        raise BagError(path, text) from None
     found = sum(len(stream.payloads) for stream in streams.values())
     if found != expected:
         raise BagError(path, f"{found} messages", expected=f"{expected}, as {FILE_NAME} says")

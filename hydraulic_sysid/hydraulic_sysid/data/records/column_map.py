@@ -25,6 +25,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from hydraulic_interfaces.errors import one_line
 from hydraulic_sysid.data.errors import ColumnMapError
 from hydraulic_sysid.data.records.channels import CHANNELS, TIME, allowed, si_unit
 
@@ -101,7 +102,7 @@ def load_column_map(source: str | Path) -> ColumnMap:
     try:
         document = load_yaml(YAML(typ="safe"), path.read_text(encoding="utf-8"))
     except (YAMLError, UnicodeDecodeError) as error:
-        raise ColumnMapError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+        raise ColumnMapError(f"{path}: not YAML: {one_line(error)}") from None
     return parse_column_map(document, str(path))
 
 

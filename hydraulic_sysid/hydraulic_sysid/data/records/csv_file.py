@@ -22,11 +22,6 @@ SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz")
 _GZIP_MAGIC = b"\x1f\x8b"
 
 
-def table(path: Path, columns: ColumnMap | None = None) -> CsvTable:
-    """See `CsvTable`."""
-    return CsvTable(path, columns)
-
-
 def content(record: Record) -> bytes:
     """The table of a record; reading gives the same numbers back.
 
@@ -183,6 +178,9 @@ class CsvTable:
                 label = self.names[index] if self.names else index + 1
                 return FileError(self.path, problem, row=row, column=label, expected="a number")
         return FileError(self.path, str(error))
+
+
+table = CsvTable
 
 
 def _text(path: Path) -> str:

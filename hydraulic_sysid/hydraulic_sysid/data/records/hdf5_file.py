@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hydraulic_interfaces.errors import one_line
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import FileError
 from hydraulic_sysid.data.records.channels import CHANNELS, TIME
@@ -34,7 +35,7 @@ def table(path: Path, columns: ColumnMap | None = None) -> Vectors:
         if item.dtype.names:
             for field in item.dtype.names:
                 spread(found, f"{name}/{field}", np.asarray(item[field]))
-        elif item.dtype.kind in "fiub":
+        elif item.dtype.kind in "fiub" and item.ndim <= 2:  # pictures and the like are not even read
             spread(found, _header(name, item), np.asarray(item))
 
     try:
@@ -42,8 +43,7 @@ def table(path: Path, columns: ColumnMap | None = None) -> Vectors:
             file.visititems(add)
             return Vectors(path, found, described(file.attrs.get(DESCRIPTION)))
     except Exception as error:  # of a damaged file the library lets through whatever it trips over
-        problem = f"no readable HDF5 file ({' '.join(str(error).split())[:200]})"
-        raise FileError(path, problem) from None
+        raise FileError(path, f"no readable HDF5 file ({one_line(error, 200)})") from None
 
 
 def _header(name: str, item: Any) -> str:

@@ -32,7 +32,7 @@ def table(path: Path, columns: ColumnMap | None = None) -> Vectors:
     if path.stat().st_size == 0:
         raise FileError(path, "the file is empty")
     try:
-        content = loadmat(str(path))
+        variables = loadmat(str(path))
     except NotImplementedError:  # scipy's word for version 7.3
         return hdf5_file.table(path, columns)
     except MemoryError:
@@ -40,10 +40,10 @@ def table(path: Path, columns: ColumnMap | None = None) -> Vectors:
     except Exception as error:  # scipy lets through whatever it trips over in a damaged file
         raise FileError(path, f"no readable MATLAB file ({type(error).__name__}: {error})") from None
     found: dict[str, Array] = {}
-    for name, value in content.items():
+    for name, value in variables.items():
         if not name.startswith("__"):
             spread(found, name, value)
-    text = content.get(DESCRIPTION)
+    text = variables.get(DESCRIPTION)
     return Vectors(path, found, described(str(text[0]) if getattr(text, "size", 0) == 1 else None))
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hydraulic_interfaces.errors import one_line
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import FileError
 from hydraulic_sysid.data.records.channels import TIME
@@ -36,8 +37,7 @@ def table(path: Path, columns: ColumnMap | None = None) -> Vectors:
                 spread(found, name, np.asarray(column.to_numpy()))
         metadata = read.schema.metadata or {}
     except Exception as error:  # of a damaged file the library lets through whatever it trips over
-        problem = f"no readable Parquet file ({' '.join(str(error).split())[:200]})"
-        raise FileError(path, problem) from None
+        raise FileError(path, f"no readable Parquet file ({one_line(error, 200)})") from None
     return Vectors(path, found, described(metadata.get(DESCRIPTION.encode())))
 
 

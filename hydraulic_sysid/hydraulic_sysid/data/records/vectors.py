@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hydraulic_node_utils.json_file import json_object
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.errors import ColumnMapError, FileError
 from hydraulic_sysid.data.records.channels import TIME_UNIT
@@ -98,11 +99,8 @@ def spread(columns: dict[str, Array], name: str, value: Any) -> None:
 
 def described(text: object) -> dict[str, Any]:
     """The description that a file keeps as JSON; empty where there is none."""
-    try:
-        found = json.loads(text) if isinstance(text, str | bytes) else {}
-    except ValueError:
-        return {}
-    return found if isinstance(found, dict) else {}
+    found = json_object(text) if isinstance(text, str | bytes) else {}
+    return found if isinstance(found.get("notes", []), list) else {}
 
 
 def header(record: Record, channel: str) -> str:

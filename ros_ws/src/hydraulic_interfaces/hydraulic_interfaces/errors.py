@@ -6,3 +6,8 @@ class HydraulicError(Exception):
 
     exit_code = 2
     """Of the command line that it ends: 2 where the input is at fault, 1 where that was fine but the work failed."""
+
+
+def one_line(error: BaseException, most: int | None = None) -> str:
+    """What another library's error says, in one line of ``most`` characters; its kind where it says nothing."""
+    return " ".join(str(error).split())[:most] or type(error).__name__

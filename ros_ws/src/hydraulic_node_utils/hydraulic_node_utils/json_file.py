@@ -23,7 +23,7 @@ def read_json(path: Path, error: type[HydraulicError]) -> Any:
         raise error(f"{path}: not a JSON document ({problem})") from problem
 
 
-def json_object(text: str) -> dict[str, Any]:
+def json_object(text: str | bytes) -> dict[str, Any]:
     """The JSON object in a text that came over a topic; empty where it holds none: anybody may publish anything."""
     try:
         found = json.loads(text)

@@ -91,7 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--record", nargs="+", metavar="PATH", help="records that exist: bag, CSV, MAT, or a folder of such"
     )
-    parser.add_argument("--columns", metavar="MAP", help="column map of CSV and MAT records")
+    parser.add_argument("--columns", metavar="MAP", help="column map of records that are tables")
     parser.add_argument(
         "--model", metavar="FILE", default=DATA_SHEET, help=f"model file or preset (default {DATA_SHEET})"
     )

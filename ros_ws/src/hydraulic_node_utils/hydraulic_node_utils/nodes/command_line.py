@@ -13,6 +13,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from hydraulic_interfaces.errors import one_line
 from hydraulic_node_utils.nodes import middleware, rclpy_internals
 from hydraulic_node_utils.nodes.log_callers import know_log_callers
 from hydraulic_node_utils.parameter_spec import ParameterSpec
@@ -46,7 +47,7 @@ def start(options: argparse.ArgumentParser, argv: list[str] | None) -> argparse.
         given = options.parse_args(remove_ros_args(arguments)[1:])
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # rclpy has no common base for what it says about its arguments
-        options.error(f"ROS arguments: {' '.join(str(error).split())}")
+        options.error(f"ROS arguments: {one_line(error)}")
     know_log_callers()
     return given
 
@@ -56,6 +57,6 @@ def make(node: Callable[[], N]) -> N:
     try:
         return node()
     except (ParameterException, ValueError, OSError, RuntimeError) as error:  # the last: of rcl
-        print(f"{Path(sys.argv[0]).stem}: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"{Path(sys.argv[0]).stem}: {one_line(error)}", file=sys.stderr)
         rclpy.try_shutdown()
         sys.exit(2)
