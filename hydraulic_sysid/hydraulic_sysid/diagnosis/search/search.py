@@ -400,6 +400,21 @@ class Search:
         seen = refit_rounded(at, _with_values(model, at.model))
         return SearchState(seen.model, at, misfit(self.split, seen.costs), seen.residual)
 
+    def begun_anew(self, state: SearchState) -> SearchState:
+        """A state, or where that leaves less, one with the same effects fitted from the values of the model file.
+
+        A model that lacks an effect is bent to imitate it, often up to bounds, and once the effect is there a fit from
+        such values may end in a local minimum.
+        """
+        if state.misfit.variance - 1.0 < NOTHING_LEFT:
+            return state
+        filed = {k: self.given.value(k) for k in self.given.movable_keys()}
+        try:
+            again = self.state(state.model.with_values(filed), self._last)
+        except SimulationError:
+            return state
+        return min(state, again, key=lambda s: s.misfit.total)
+
     def _strict(self, base: SearchState) -> bool:
         """Whether the data sheet is as it was given."""
         at, given = base.model.entry, self.given.entry
@@ -468,7 +483,7 @@ class Search:
         for tried in [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][:FULL]:
             self.say(f"fitting with {tried.name}")
             try:
-                state = self.state(tried.refit.model, self._last)
+                state = self.begun_anew(self.state(tried.refit.model, self._last))
             except SimulationError:
                 continue
             if material(base.misfit, state.misfit) and enough(tried.name, state.misfit, 1.0):
@@ -606,7 +621,7 @@ class Search:
                 continue
             others = [a for a in added if a != name]
             try:
-                without = self.state(state.model.without_effect(name), self._last)
+                without = self.begun_anew(self.state(state.model.without_effect(name), self._last))
             except SimulationError:  # with these values the model does not run without it
                 continue
             if superfluous(base, without, state, name, others):
