@@ -500,3 +500,33 @@ def test_dry_friction_of_a_light_piston_is_looked_for(model) -> None:
     best, second = tried.refits[:2]
     assert best.name == "coulomb_friction"
     assert best.misfit.excess < 0.5 * min(second.misfit.excess, base.misfit.excess)
+
+
+def test_what_a_model_was_bent_to_without_an_effect_does_not_hold_it_in_a_local_minimum() -> None:
+    """Spool and smoothing at their bounds, as a fit without the dead band leaves them: from there none leads out."""
+    built = load_model("moog_mcr_m_1002_bench").with_effect("valve_deadband", {"width": 0.03})
+    built = built.with_values({"spool_dynamics.frequency": 60.0, "spool_dynamics.damping": 0.7})
+    time, draw = DT * np.arange(8000), np.random.default_rng(11)
+    drive = 3.0 * np.sin(2.0 * np.pi * (0.2 * time + 0.5 * time**2))
+    run = Plant(built).simulate(drive, DT, Plant(built).initial_state())
+    noise = {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}
+    seen = {c: np.asarray(getattr(run, c)) + std * draw.standard_normal(time.size) for c, std in noise.items()}
+    record = Record.sampled("sweep", DT, {"drive": drive, **seen})
+    search = Search.of(load_model("moog_mcr_m_1002_bench"), [record], [], FitSettings(), lambda _: None)
+    bent = built.with_values(
+        {
+            "moving_mass": 431.0,
+            "spool_dynamics.frequency": 1000.0,
+            "spool_dynamics.damping": 2.0,
+            "orifice_transition": 1e6,
+            "bristle_length": 5e-6,
+            "bristle_time": 2.34e-3,
+            "viscous_friction.coefficient": 1190.0,
+            "internal_leakage.coefficient": 0.0,
+        }
+    )
+    true, stuck = search.state(built), search.state(bent)
+    assert stuck.misfit.total > 1.5 * true.misfit.total
+    found = search.begun_anew(stuck)
+    assert found.misfit.total < 1.01 * true.misfit.total
+    assert found.model.value("spool_dynamics.frequency") == pytest.approx(60.0, rel=0.05)
