@@ -73,7 +73,6 @@ ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects l
 FULL = 2  # candidates that are refitted from more than one start, and with all sensitivities taken anew
 NEAR = 0.93  # of the best reduction, from which a refit is finished
 MOST_EFFECTS = 3
-LOOSE = 1.03  # mean square over noise from which numbers of the data sheet are tried at all
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
 SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
@@ -158,7 +157,7 @@ class Search:
 
     def loose(self, strict: SearchState) -> SearchState | None:
         """A state with the data sheet relaxed, where that helps."""
-        if strict.misfit.variance < LOOSE or not self._strict(strict):
+        if strict.misfit.variance - 1.0 < NOTHING_LEFT or not self._strict(strict):
             return None
         self.say("fitting the model within the tolerances of its data sheet")
         at_bound = strict.linearisation.parameters.at_bound
@@ -557,7 +556,7 @@ class Search:
                     base = replace(plain, refits=base.refits, scores=base.scores)
                     path, better = [base], None
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
-            doubtful = bool(added) and (better is None or better.misfit.variance >= LOOSE)
+            doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= NOTHING_LEFT)
             loose = self.loose(path[-1]) if doubtful else None
             if loose is not None and (better is None or loose.misfit.total < better.misfit.total):
                 loose, model = self.judged(loose), loose.model
