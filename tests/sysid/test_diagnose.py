@@ -274,6 +274,18 @@ def test_what_a_fault_of_the_recording_explains_is_explained(model) -> None:
     assert found.before is found.as_recorded and found.unexplained_share < 0.01
 
 
+def test_a_small_remainder_does_not_take_back_what_is_said_of_the_recording(model) -> None:
+    base = state(model, 3000 * 1.2, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
+    assert verdict.kind_of(found, tied=False) == verdict.OUTSIDE
+    late = RecordingFault(HYPOTHESES[0], 2e-3, 1e-5, 5000.0)
+    found = replace(found, faults=(late,), as_recorded=at(3000 * 5.0))
+    assert verdict.kind_of(found, tied=False) == verdict.RECORDING
+    much = replace(found, as_recorded=at(3000 * 1.5))
+    assert verdict.kind_of(much, tied=False) == verdict.OUTSIDE
+    assert late.text in verdict.sentences(much, verdict.judge(much), []), "it is said all the same"
+
+
 def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:
     assert not Deviation("dead_volume_a", 200e-6, 202e-6, 2.1e-6, 2000.0).sure
     assert Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0).sure

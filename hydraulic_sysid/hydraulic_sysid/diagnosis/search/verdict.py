@@ -121,16 +121,16 @@ def kind_of(result: SearchResult, tied: bool) -> str:
     if result.stopped:
         return UNDECIDED
     final = result.final.misfit
-    left = unexplained_share(result.base.misfit, final)
     little = final.little or immaterial(final, result.remainders)
     if not result.added:
-        if not little and left > UNEXPLAINED:
+        # Faults of the recording may have explained the most of it.
+        if not little and result.unexplained_share > UNEXPLAINED:
             return RECORDING if drive_unknown(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
     allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if final.variance < SMALL else UNEXPLAINED
-    if left > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
+    if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
     return INDISTINGUISHABLE if tied else MISSING
 
@@ -203,7 +203,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         best = curves[0]
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
         text += f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
-    return " ".join([text.strip(), *aside])
+    return " ".join([text.strip(), *beside])
 
 
 def remainder_sentence(found: Sequence[Remainder]) -> str:
