@@ -36,6 +36,11 @@ BASE: dict[str, object] = {"time": {"dt": 0.1}, "channels": {"drive": {"column":
         ({"time": {"dt": 0.1, "column": 1}}, "'column' or 'dt'"),
         ({"time": {"column": 1, "unit": "m"}}, "'m' does not convert to s"),
         ({"time": {"column": 1, "unit": "s", "irregular": "guess"}}, "error.*resample.*split"),
+        ({"files": {"*_pA_*": {"presure_a": {"column": 2, "unit": "Pa"}}}}, "'presure_a' is no channel"),
+        ({"files": {"*_pA_*": {"drive": {"column": 2, "unit": "V"}}}}, "drive is mapped for all files already"),
+        ({"files": {"*_pA_*": {}}}, "maps no channel"),
+        ({"files": {3: {}}}, "3 is no pattern of file names"),
+        ({"files": []}, "mapping"),
         ({"delimiter": "ab"}, "delimiter"),
         ({"notes": None}, "notes is None, must be a text or a list of texts"),
         ({"notes": [1]}, "must be a text or a list of texts"),
@@ -61,3 +66,25 @@ def test_column_map_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
     for name, said in (("bad.yaml", "not YAML"), ("list.yaml", "mapping"), ("none.yaml", "festo_hanging_load")):
         with pytest.raises(ColumnMapError, match=said):
             load_column_map(tmp_path / name)
+
+
+MOVED = BASE | {
+    "files": {f"*_p{x}_*": {f"pressure_{x.lower()}": {"column": 2, "unit": "MPa", "scale": 0.1}} for x in "AB"}
+}
+
+
+def test_a_transducer_that_was_moved_is_another_channel_in_other_files(tmp_path: Path) -> None:
+    for name in ("run_pA_1.csv", "run_pB_1.csv"):
+        (tmp_path / name).write_text("\n".join(f"{0.1 * i},{20 + i}" for i in range(20)) + "\n")
+    first, second = read_records(tmp_path, parse_column_map(MOVED))
+    assert [sorted(r.channels) for r in (first, second)] == [["drive", "pressure_a"], ["drive", "pressure_b"]]
+    assert second["pressure_b"][0] == pytest.approx(2e6)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("run_pC_1.csv", "matches none"), ("run_pA_pB_1.csv", "'\\*_pA_\\*' and '\\*_pB_\\*'")]
+)
+def test_a_file_of_which_a_map_says_nothing_or_two_things_is_refused(tmp_path: Path, name: str, said: str) -> None:
+    (tmp_path / name).write_text("1,2\n3,4\n")
+    with pytest.raises(ColumnMapError, match=f"files: '{name}' .*{said}.*exactly one must"):
+        read_records(tmp_path / name, parse_column_map(MOVED, "map"))

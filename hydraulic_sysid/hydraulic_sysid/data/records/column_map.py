@@ -13,7 +13,12 @@ A map is a YAML file::
     notes: Where the numbers come from.
 
 ``records: {left: {…}, right: {…}}`` in place of ``channels`` makes several records of one file. A map with neither
-these nor ``extra`` leaves it to the headers to name the channels, and says the rest.
+these nor ``extra`` leaves it to the headers to name the channels, and says the rest. Where one column is another
+channel in other files of a set, as of a transducer that was moved, ``files`` has it by the files' names::
+
+    files:
+      "*_pA_*": {pressure_a: {column: p, unit: MPa}}
+      "*_pB_*": {pressure_b: {column: p, unit: MPa}}
 """
 
 from __future__ import annotations
@@ -21,6 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -61,7 +67,7 @@ class ColumnMap:
     ``units`` are those of the channels that are not in `CHANNELS`. Either ``time`` is a column or ``dt`` is the
     period in seconds. ``irregular`` says what to do with stamps that are not even: refuse them, resample
     (interpolate on the even grid) or split into several records. ``header``: None looks for itself; ``delimiter``
-    and ``decimal`` too.
+    and ``decimal`` too. ``files``: what files of such a name have besides, by pattern; see `for_file`.
     """
 
     parts: Mapping[str, Mapping[str, Column]]
@@ -74,6 +80,22 @@ class ColumnMap:
     decimal: str | None = None
     name: str = ""
     notes: Sequence[str] = field(default_factory=tuple)
+    files: Mapping[str, Mapping[str, Column]] = field(default_factory=dict)
+
+    def for_file(self, name: str) -> ColumnMap:
+        """The map of a file of this name: with what ``files`` says of it.
+
+        :raises ColumnMapError: not exactly one of the patterns matches.
+        """
+        if not self.files:
+            return self
+        found = [pattern for pattern in self.files if fnmatchcase(name, pattern)]
+        if len(found) != 1:
+            problem = f"matches {' and '.join(map(repr, found)) or 'none'} of the patterns"
+            allowed_names = ", ".join(map(repr, self.files))
+            raise ColumnMapError(f"{self.name}: files: {name!r} {problem} {allowed_names}; exactly one must")
+        parts = {part: {**columns, **self.files[found[0]]} for part, columns in self.parts.items()}
+        return replace(self, parts=parts, files={})
 
 
 def shipped_maps() -> dict[str, Path]:
@@ -111,7 +133,7 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
 
     :raises ColumnMapError: contents that mean nothing; the text names the key and what is allowed.
     """
-    keys = ("time", "channels", "extra", "records", "header", "delimiter", "decimal", "notes")
+    keys = ("time", "channels", "extra", "records", "files", "header", "delimiter", "decimal", "notes")
     top = _mapping(document, where, keys)
     if "channels" in top and "records" in top:
         raise ColumnMapError(f"{where}: has both 'channels' and 'records' (several groups of channels); one is allowed")
@@ -125,10 +147,11 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
         str(name): {**_channels(group, f"{where}: records.{name}" if name else f"{where}: channels"), **extra}
         for name, group in groups.items()
     }
-    if "channels" not in top and "records" not in top and not extra:
+    files = _files(top.get("files", {}), parts, f"{where}: files")
+    if "channels" not in top and "records" not in top and not extra and not files:
         parts = {}
     for name, part in parts.items():
-        if not part:
+        if not part and not files:
             raise ColumnMapError(f"{where}: {f'records.{name}' if name else 'channels'} maps no channel")
     time = _mapping(top.get("time", {}), f"{where}: time", ("column", "unit", "scale", "dt", "irregular"))
     if ("dt" in time) == ("column" in time) and (parts or "dt" in time):
@@ -157,6 +180,7 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
         _choice(top.get("decimal"), f"{where}: decimal", (".", ",", None)),
         where,
         tuple(notes),
+        files,
     )
 
 
@@ -196,6 +220,21 @@ def _channels(document: Any, where: str) -> dict[str, Column]:
             raise ColumnMapError(problem)
     # "pressure_b: null" says in so many words that a channel was not measured.
     return {n: _column(entry, n, f"{where}.{n}") for n, entry in entries.items() if entry is not None}
+
+
+def _files(document: Any, parts: Mapping[str, Mapping[str, Column]], where: str) -> dict[str, Mapping[str, Column]]:
+    found: dict[str, Mapping[str, Column]] = {}
+    for pattern, group in _mapping(document, where).items():
+        if not isinstance(pattern, str) or not pattern:
+            raise ColumnMapError(f"{where}: {pattern!r} is no pattern of file names, such as '*_pA_*'")
+        own = _channels(group, f"{where}.{pattern}")
+        twice = [name for name in own if any(name in part for part in parts.values())]
+        if twice:
+            raise ColumnMapError(f"{where}.{pattern}: {', '.join(twice)} is mapped for all files already")
+        if not own:
+            raise ColumnMapError(f"{where}.{pattern} maps no channel")
+        found[pattern] = own
+    return found
 
 
 def _extra(document: Any, where: str) -> dict[str, Column]:
