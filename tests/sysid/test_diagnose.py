@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
@@ -15,6 +16,7 @@ from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verd
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, HeldNumbers, as_filed, relaxed
+from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
@@ -514,9 +516,11 @@ def test_dry_friction_of_a_light_piston_is_looked_for(model) -> None:
     assert best.misfit.excess < 0.5 * min(second.misfit.excess, base.misfit.excess)
 
 
-def test_what_a_model_was_bent_to_without_an_effect_does_not_hold_it_in_a_local_minimum() -> None:
-    """Spool and smoothing at their bounds, as a fit without the dead band leaves them: from there none leads out."""
-    built = load_model("moog_mcr_m_1002_bench").with_effect("valve_deadband", {"width": 0.03})
+@pytest.fixture(scope="module")
+def swept() -> tuple[Model, Model, Search]:
+    """A plant with a dead band, the same bent as by a fit without it (spool and smoothing at bounds), and a search."""
+    given = load_model("moog_mcr_m_1002_bench")
+    built = given.with_effect("valve_deadband", {"width": 0.03})
     built = built.with_values({"spool_dynamics.frequency": 60.0, "spool_dynamics.damping": 0.7})
     time, draw = DT * np.arange(8000), np.random.default_rng(11)
     drive = 3.0 * np.sin(2.0 * np.pi * (0.2 * time + 0.5 * time**2))
@@ -524,7 +528,6 @@ def test_what_a_model_was_bent_to_without_an_effect_does_not_hold_it_in_a_local_
     noise = {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}
     seen = {c: np.asarray(getattr(run, c)) + std * draw.standard_normal(time.size) for c, std in noise.items()}
     record = Record.sampled("sweep", DT, {"drive": drive, **seen})
-    search = Search.of(load_model("moog_mcr_m_1002_bench"), [record], [], FitSettings(), lambda _: None)
     bent = built.with_values(
         {
             "moving_mass": 431.0,
@@ -537,8 +540,21 @@ def test_what_a_model_was_bent_to_without_an_effect_does_not_hold_it_in_a_local_
             "internal_leakage.coefficient": 0.0,
         }
     )
+    return built, bent, Search.of(given, [record], [], FitSettings(), lambda _: None)
+
+
+def test_what_a_model_was_bent_to_without_an_effect_does_not_hold_it_in_a_local_minimum(swept) -> None:
+    built, bent, search = swept
     true, stuck = search.state(built), search.state(bent)
     assert stuck.misfit.total > 1.5 * true.misfit.total
     found = search.begun_anew(stuck)
     assert found.misfit.total < 1.01 * true.misfit.total
     assert found.model.value("spool_dynamics.frequency") == pytest.approx(60.0, rel=0.05)
+
+
+def test_nor_where_the_effect_is_added_on_request(swept, monkeypatch) -> None:
+    _, bent, search = swept
+    monkeypatch.setattr(search, "refit", lambda base, s: CandidateRefit(s.effect.name, Refit(bent, []), base.misfit))
+    found = search.add("valve_deadband").final
+    assert found.misfit.variance < 1.05
+    assert found.model.value("spool_dynamics.frequency") == pytest.approx(60.0, rel=0.1)

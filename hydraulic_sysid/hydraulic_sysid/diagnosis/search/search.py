@@ -599,7 +599,7 @@ class Search:
         tried = min((self.refit(base, replace(scores[0], start=s)) for s in starts), key=lambda r: r.misfit.total)
         self.say(f"fitting with {name}")
         # What the model without it left was no sure guide to noise and delays.
-        final = self.judged(self.state(tried.refit.model))
+        final = self.judged(self.begun_anew(self.state(tried.refit.model)))
         base = replace(self.state(base.model, self._last), refits=[tried], scores=scores)
         found = SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
         return accidents_named(self.concluded(found))
