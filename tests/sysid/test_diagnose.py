@@ -286,6 +286,8 @@ def test_a_small_remainder_does_not_take_back_what_is_said_of_the_recording(mode
     much = replace(found, as_recorded=at(3000 * 1.5))
     assert verdict.kind_of(much, tied=False) == verdict.OUTSIDE
     assert late.text in verdict.sentences(much, verdict.judge(much), []), "it is said all the same"
+    much = replace(much, moved=(Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0),))
+    assert "dead_volume_a" not in verdict.sentences(much, verdict.judge(much), []), "bent to what is not known"
 
 
 def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:

@@ -203,7 +203,8 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         best = curves[0]
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
         text += f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
-    return " ".join([text.strip(), *beside])
+    # Not what the numbers of the data sheet were bent to: they imitate what no effect explains.
+    return " ".join([text.strip(), *recording_sentences(result), *aside])
 
 
 def remainder_sentence(found: Sequence[Remainder]) -> str:
