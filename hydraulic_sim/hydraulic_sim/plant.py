@@ -28,7 +28,8 @@ _OF_FORCES = ("moving_mass", "drive_force", "bristle_length", "bristle_time")  #
 _READINGS = 4  # of the outputs, the first: what sensors read
 FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
 MOST_HALVINGS = 6
-CORRECTED_EVERY = 4  # samples after which a tracked plant is set to what was measured
+CORRECTED_EVERY = 4  # samples after which a tracked plant is set to what was measured, …
+UNCORRECTED = 256  # … and one whose inner states follow from the drive alone
 
 
 class Plant:
@@ -59,6 +60,7 @@ class Plant:
         self.refinement, self._allowed_step = refinement, longest_step
         self.longest_step = rates.step(rates.fastest(self._active, values, model.kind), longest_step, refinement)
         self._shortest_dt = rates.shortest_sampling(self._active, values)
+        self._corrected_every = CORRECTED_EVERY
 
     def _values(self) -> dict[str, float]:
         return dict(zip(self.layout.parameters, self._parameters.tolist(), strict=True))
@@ -269,7 +271,7 @@ class Plant:
         other._on = np.zeros_like(self._on)
         for e in inner:
             other._on[self.layout.effects[e.name]] = 1
-        other._hydraulic = np.uint8(0)
+        other._hydraulic, other._corrected_every = np.uint8(0), UNCORRECTED
         rate = rates.fastest(inner, self._values(), "mechanical")
         other.longest_step = max(self.longest_step, rates.step(rate, self._allowed_step, self.refinement))
         return other
@@ -315,7 +317,7 @@ class Plant:
         x, memory, failure = begin.states.copy(), begin.memory.copy(), np.zeros(2)
         states, memories = np.empty((len(first), x.size)), np.empty((len(first), memory.size))
         done = self._compiled.track(
-            u, dt, self.longest_step, self._turn, measured, CORRECTED_EVERY, first, self._on, self._parameters,
+            u, dt, self.longest_step, self._turn, measured, self._corrected_every, first, self._on, self._parameters,
             self._hydraulic, x, memory, states, memories, failure,
         )  # fmt: skip
         if done < len(first):

@@ -19,6 +19,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.estimation.covariance import inverse
 from hydraulic_sysid.estimation.parameters import Priors
 
+from .candidates import inverse as inverse_to
 from .linearisation import Linearisation
 from .uncertainty import Known
 
@@ -28,6 +29,7 @@ LEAST_PRESSURE = 1e5  # Pa, of a tank pressure near 0
 NAMED = ("piston_area_a", "piston_area_b", "dead_volume_a", "dead_volume_b", "supply_pressure", "tank_pressure")
 """Base parameters that a data sheet states and a diagnosis leaves as they are."""
 SIGNIFICANT = 25.0  # reduction of the sum of squares, of the variance, for which a number is named …
+PLAUSIBLE = 3.0  # times an effect's default size: a standard deviation of its size
 SURE = 2.0  # standard errors by which a number must be off to be named
 VISIBLE = 0.01  # … at least this share of the number of residuals
 
@@ -85,8 +87,16 @@ def stretched(given: Model) -> list[str]:
 
 
 def priors(given: Model) -> Priors:
-    """What a model file says of its numbers: its value, and bounds or tolerance as two standard deviations."""
+    """What is known beforehand: a model file's numbers, with bounds or tolerance as two standard deviations.
+
+    An effect that is not in the file, and whose size is a share of something, is as large as the library's default, or
+    a few times that: a sensor's scale is not off by a third.
+    """
     loose, found = relaxed(given), {}
+    for effect in given.library.values():
+        for p in () if effect.name in given.effects else effect.parameters:
+            if p.unit == "1" and p.null not in (None, p.default) and not inverse_to(p.null, p.default):
+                found[f"{effect.name}.{p.name}"] = (p.null, PLAUSIBLE * abs(p.default - p.null))
     for key in loose.free_keys():
         own = given.entries.get(key)
         if "." not in key and own is not None and own.value > 0.0:

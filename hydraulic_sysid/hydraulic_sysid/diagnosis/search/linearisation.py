@@ -22,21 +22,29 @@ from .holdout import Split
 class Linearisation:
     """A model fitted to the segments of ``split`` that are for fitting, linearised on all of them.
 
-    ``columns[i]`` (S, m, P): change of record i's residuals with each parameter, over its scale; ``beyond[i]`` the
-    same without what the initial states explain.
+    ``known``: `beyond`, where it was taken before.
     """
 
     model: Model
     split: Split
     point: FitPoint
-    columns: list[Array]
-    beyond: list[Array]
+    known: list[Array] | None = None
 
     @classmethod
     def of(cls, model: Model, split: Split, priors: Priors = NO_PRIORS) -> Linearisation:
         """Of a model that was fitted before."""
         point = FitPoint.begin(Plant.for_fits(model), split.segments, model.movable_keys(), priors=priors).at_rest()
-        return cls(model, split, point, point.columns, point.beyond(point.columns))
+        return cls(model, split, point)
+
+    @property
+    def columns(self) -> list[Array]:
+        """(S, m, P) per record: change of the residuals with each parameter, over its scale; taken when asked for."""
+        return self.point.columns
+
+    @cached_property
+    def beyond(self) -> list[Array]:
+        """The same without what the initial states explain."""
+        return self.point.beyond(self.columns) if self.known is None else self.known
 
     @property
     def parameters(self) -> Parameters:
@@ -103,13 +111,13 @@ class Linearisation:
 
     def slim(self) -> Linearisation:
         """The same without ``columns``, which only refits need: a search keeps several linearisations in memory."""
-        return replace(self, columns=[])
+        return replace(self, point=replace(self.point), known=self.beyond)
 
     def _subset(self, chosen: Sequence[Mask]) -> Linearisation:
         point = self.point.subset(chosen)
         split = Split(list(point.shooting.segments), [np.ones(len(s), dtype=bool) for s in point.shooting.segments])
         beyond = [b[c] for b, c in zip(self.beyond, chosen, strict=True) if c.any()]
-        return Linearisation(self.model, split, point, [], beyond)
+        return Linearisation(self.model, split, point, beyond)
 
     def _inner(self, left: Sequence[Array], right: Sequence[Array]) -> Array:
         """Σ over the segments for fitting of left·right: (S, m, P), (S, m, Q) → (P, Q)."""

@@ -24,7 +24,11 @@ VISIBLE = 5e-4  # over all residuals, of their present variance: a smaller one i
 
 @dataclass(frozen=True)
 class Misfit:
-    """Sums of squares over noise on segments for fitting and for validation, and how many free values they are of."""
+    """Sums of squares over noise on segments for fitting and for validation, and how many free values they are of.
+
+    ``prior``: what the parameters' distance from what is known of them beforehand adds. A model that leaves no more but
+    bends the data sheet less is the better one.
+    """
 
     fit: float
     validation: float
@@ -38,6 +42,7 @@ class Misfit:
     """… how many values it is of, …"""
     fitted: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool), compare=False)
     """… and whether it was fitted."""
+    prior: float = 0.0
 
     @property
     def rms_fit(self) -> float:
@@ -56,13 +61,18 @@ class Misfit:
 
     @property
     def total(self) -> float:
-        """Sum of squares."""
+        """Sum of squares, the prior's part included."""
+        return self.squares + self.prior
+
+    @property
+    def squares(self) -> float:
+        """Sum of squares of what is left of the records."""
         return self.fit + self.validation
 
     @property
     def variance(self) -> float:
         """Mean square over noise, at least 1."""
-        return max(1.0, self.total / max(self.count, 1))
+        return max(1.0, self.squares / max(self.count, 1))
 
     @property
     def summed(self) -> Misfit:
@@ -72,7 +82,7 @@ class Misfit:
     @property
     def excess(self) -> float:
         """What of the sum of squares noise does not explain."""
-        return max(self.total - self.count, 0.0)
+        return max(self.squares - self.count, 0.0)
 
     @property
     def usual(self) -> float:
@@ -90,8 +100,8 @@ class Misfit:
         return max(SIGNIFICANT, VISIBLE * self.count) * self.variance
 
 
-def misfit(split: Split, costs: Sequence[Array]) -> Misfit:
-    """Of the sums of squares ``costs[i]`` (S_i,); each initial state takes its degrees of freedom."""
+def misfit(split: Split, costs: Sequence[Array], prior: float = 0.0) -> Misfit:
+    """Of the sums of squares ``costs[i]`` (S_i,) and of the prior; each initial state takes its degrees of freedom."""
     sums, counts = [0.0, 0.0], [0, 0]
     cost, count = np.concatenate(list(costs)), np.concatenate([s.counted for s in split.segments])
     kept = _but_the_worst(cost, count)
@@ -108,6 +118,7 @@ def misfit(split: Split, costs: Sequence[Array]) -> Misfit:
         cost,
         count,
         np.concatenate(split.fit),
+        prior,
     )
 
 

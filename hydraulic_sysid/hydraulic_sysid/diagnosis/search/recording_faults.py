@@ -185,7 +185,7 @@ def _cost_disturbed(part: Linearisation, responses: Sequence[Array]) -> float:
     point = replace(part.point, shooting=shooting, projections=projections)
     beyond = [p.beyond(b) for p, b in zip(projections, part.beyond, strict=True)]
     worth = sum(float(f.sum()) for f in freedom(projections, part.point.projections))
-    return _cost(replace(part, point=point, beyond=beyond), [p.raw for p in projections]) + worth
+    return _cost(replace(part, point=point, known=beyond), [p.raw for p in projections]) + worth
 
 
 def _best(

@@ -24,6 +24,7 @@ from .candidates import LARGE, SIZES, SMALL, Probe, RecordFeatures, between, inv
 from .linearisation import Linearisation
 
 ENOUGH = 50  # segments that do for a look, spread over all records
+TOO_FAR = 1.0  # times the sum of squares that is left: a probe that changes more than this is no first order
 AS_WELL = 0.5  # of the best prediction, from which that of another shape is a start as well
 
 
@@ -41,6 +42,14 @@ class CandidateScore:
     others: tuple[dict[str, float], ...] = ()
 
 
+@dataclass(frozen=True)
+class _Prediction:
+    """What one group of probes promises; ``change``: of the residuals, over what is left (sums of squares)."""
+
+    score: CandidateScore
+    change: float
+
+
 def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures) -> list[CandidateScore]:
     """All candidates, the best first; reductions of all segments for fitting, of which a sample is looked at."""
     part, share = at.sample(ENOUGH)
@@ -50,13 +59,22 @@ def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures
 
 
 def _score(at: Linearisation, effect: Effect, features: RecordFeatures) -> CandidateScore | None:
+    """By probes of usual sizes; by larger ones where those change nothing, by smaller ones where they go too far."""
     model = at.model.with_effect(effect.name)
-    for sizes in (SIZES, LARGE, SMALL):
-        found = [_predict(at, model, effect, group) for group in probes(effect, features, sizes)]
-        usable = [f for f in found if f is not None]
-        if usable:
-            return _best(usable)
-    return None
+    tried = [_predictions(at, model, effect, features, SIZES)]
+    if not tried[0]:
+        tried.append(_predictions(at, model, effect, features, LARGE))
+    if not tried[-1] or min(p.change for p in tried[-1]) > TOO_FAR:
+        tried.append(_predictions(at, model, effect, features, SMALL))
+    found = [p.score for every in tried for p in every]
+    return _best(found) if found else None
+
+
+def _predictions(
+    at: Linearisation, model: Model, effect: Effect, features: RecordFeatures, sizes: Sequence[float]
+) -> list[_Prediction]:
+    found = [_predict(at, model, effect, group) for group in probes(effect, features, sizes)]
+    return [f for f in found if f is not None]
 
 
 def _best(found: Sequence[CandidateScore]) -> CandidateScore:
@@ -72,7 +90,7 @@ def _best(found: Sequence[CandidateScore]) -> CandidateScore:
     return replace(best, others=tuple(more))
 
 
-def _predict(at: Linearisation, model: Model, effect: Effect, group: list[Probe]) -> CandidateScore | None:
+def _predict(at: Linearisation, model: Model, effect: Effect, group: list[Probe]) -> _Prediction | None:
     try:
         # Each with the steps that its own values ask for: the effect's defaults may be those of a larger plant.
         columns = at.changes([Plant.for_fits(model.with_values(p.values)) for p in group])
@@ -80,7 +98,7 @@ def _predict(at: Linearisation, model: Model, effect: Effect, group: list[Probe]
         return None
     start = dict(group[0].values)
     if observed(effect):
-        return CandidateScore(effect, _as_observed(at, columns), start)
+        return _Prediction(CandidateScore(effect, _as_observed(at, columns), start), 0.0)
     own = len(at.parameters)
     normal = at.bordered(columns)
     # What changes nothing by itself, as a damping where there is no spring, begins at its null value.
@@ -101,7 +119,8 @@ def _predict(at: Linearisation, model: Model, effect: Effect, group: list[Probe]
     for p, amount in zip(group, change[own:].tolist(), strict=True):
         start[p.moved] = between(p.null, p.values[p.moved], amount, _parameter(effect, p).default)
     probed = {**start, **{p.moved: p.values[p.moved] for p in group}}
-    return CandidateScore(effect, gain, start, () if probed == start else (probed,))
+    change_of_residual = float(size[usable].min()) / max(sum(float(c.sum()) for c in at.costs), 1e-300)
+    return _Prediction(CandidateScore(effect, gain, start, () if probed == start else (probed,)), change_of_residual)
 
 
 def _as_observed(at: Linearisation, change: list[Array]) -> float:

@@ -20,7 +20,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
-from hydraulic_sysid.estimation.parameters import bounded
+from hydraulic_sysid.estimation.parameters import Parameters, bounded
 from hydraulic_sysid.estimation.refinement import outlying, refined, usable
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
@@ -71,6 +71,9 @@ MOST_REFITS = 8
 LATER_REFITS = 4  # once something was added, …
 ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
 FULL = 2  # candidates that are refitted from more than one start, and with all sensitivities taken anew
+OTHERS = 3  # candidates of other subsystems, that are set against those where the data sheet is bent to its bounds, …
+FEW_STEPS = 6  # … by so many steps of a fit to a few segments, …
+FEW_GAIN = 2e-3  # … while each lowers the sum of squares by this share
 NEAR = 0.93  # of the best reduction, from which a refit is finished
 MOST_EFFECTS = 3
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
@@ -119,6 +122,7 @@ class Search:
         self.as_recorded: Misfit | None = None
         self.priors = priors(model)
         self._first = replace(settings, least_gain=FIRST_GAIN)
+        self._few = replace(settings, most_steps=FEW_STEPS, least_gain=FEW_GAIN)
         self._last = replace(settings, most_steps=LAST_STEPS, least_gain=LAST_GAIN)
 
     @classmethod
@@ -270,7 +274,7 @@ class Search:
                 fault = replace(new, reduction=fault.reduction)
                 self.split = replace(before, segments=fault.on(before.segments))
                 state = self.state(state.model, self._last)
-            worth = misfit(self.split, costs_with(state.linearisation, base.linearisation))
+            worth = misfit(self.split, costs_with(state.linearisation, base.linearisation), state.misfit.prior)
             return FaultFit(fault, state, self.split, worth)
         finally:
             self.split = before
@@ -395,9 +399,13 @@ class Search:
         )  # fmt: skip
         at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors)
         if smooth is model:
-            return SearchState(at.model, at, misfit(self.split, at.costs), at.residual)
+            return SearchState(at.model, at, misfit(self.split, at.costs, at.parameters.prior_cost), at.residual)
         seen = refit_rounded(at, _with_values(model, at.model))
-        return SearchState(seen.model, at, misfit(self.split, seen.costs), seen.residual)
+        return SearchState(seen.model, at, misfit(self.split, seen.costs, self.prior_cost(seen.model)), seen.residual)
+
+    def prior_cost(self, model: Model) -> float:
+        """What a model's values cost by what was known of them beforehand."""
+        return Parameters.of(model, model.movable_keys(), self.priors).prior_cost
 
     def begun_anew(self, state: SearchState) -> SearchState:
         """A state, or where that leaves less, one with the same effects fitted from the values of the model file.
@@ -464,7 +472,7 @@ class Search:
         done = refit(at, at.model.with_effect(name), candidate.start)
         if _observed(base.model):
             done = refit_rounded(at, _with_values(base.model.with_effect(name), done.model))
-        return CandidateRefit(name, done, misfit(self.split, done.costs))
+        return CandidateRefit(name, done, misfit(self.split, done.costs, self.prior_cost(done.model)))
 
     def finish(self, base: SearchState, enough: Enough) -> SearchState | None:
         """The best of the refits, fitted to the end; None where none is worth it.
@@ -478,8 +486,9 @@ class Search:
             return None
         top = base.misfit.total - worth[0].misfit.total
         near = [r for r in worth if base.misfit.total - r.misfit.total >= NEAR * top]
+        near = [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][:FULL]
         found = []
-        for tried in [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][:FULL]:
+        for tried in self.set_against_other_subsystems(base, near):
             self.say(f"fitting with {tried.name}")
             try:
                 state = self.begun_anew(self.state(tried.refit.model, self._last))
@@ -488,6 +497,36 @@ class Search:
             if material(base.misfit, state.misfit) and enough(tried.name, state.misfit, 1.0):
                 found.append(state)
         return min(found, key=lambda s: s.misfit.total, default=None)
+
+    def set_against_other_subsystems(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
+        """The refits to finish: the nearest, or what explains more once all parameters are free.
+
+        A model whose data sheet is bent to its bounds imitates what it lacks, and from there a frozen Jacobian does not
+        lead back. The best of every other subsystem is then fitted to a few segments, too, before one is chosen.
+        """
+        at_bound, library = base.linearisation.parameters.at_bound, base.model.library
+        seen, others = {subsystem(library[r.name]) for r in near}, list[CandidateRefit]()
+        for r in base.refits:
+            if subsystem(library[r.name]) not in seen and r not in near:
+                seen.add(subsystem(library[r.name]))
+                others.append(r)
+        if not others or not any("." not in key and key in self.priors for key in at_bound):
+            return list(near)
+        found = []
+        for r in [*near, *others[:OTHERS]]:
+            self.say(f"setting {r.name} against effects of other subsystems")
+            model = self._smooth(r.refit.model)
+            try:
+                done = fit_segments(
+                    Plant.for_fits(model), self.split.some(ENOUGH), model.movable_keys(), self._few,
+                    progress=lambda *_: self.say.left(), priors=self.priors,
+                )  # fmt: skip
+            except SimulationError:
+                continue
+            fitted = replace(r.refit, model=r.refit.model.with_values(done.values))
+            found.append((done.point.cost, replace(r, refit=fitted)))
+        found.sort(key=lambda pair: pair[0])
+        return [r for _, r in found[:FULL]] or list(near)
 
     def run(self) -> SearchResult:
         """Search until the noise by which it judged is the noise that its result leaves.

@@ -1,0 +1,60 @@
+"""A model that lacks an effect bends its numbers to imitate it: what leads back, and what it costs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hydraulic_sim.model import Model
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
+from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, priors
+from hydraulic_sysid.diagnosis.search.holdout import split
+from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
+from hydraulic_sysid.diagnosis.search.misfit import Misfit
+from hydraulic_sysid.diagnosis.search.score_test import score
+
+DT, SECONDS = 1e-3, 6.0
+CAPACITY = 2e-14  # m³/Pa, a twenty-fifth of what the library takes a hose for
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return load_model("sample_bench")
+
+
+def swept(model: Model) -> Record:
+    """The bench under a sweep, with noise of 2 µm and 1 kPa."""
+    rng = np.random.default_rng(5)
+    t = DT * np.arange(round(SECONDS / DT))
+    drive = 3.0 * np.sin(2.0 * np.pi * (0.5 + 2.0 * t) * t)
+    run = Plant(model).simulate(drive, DT)
+    noise = {"position": 2e-6, "pressure_a": 1e3, "pressure_b": 1e3}
+    channels = {c: np.asarray(getattr(run, c)) + rng.normal(0.0, s, t.size) for c, s in noise.items()}
+    return Record("sweep", t, DT, {"drive": drive, **channels})
+
+
+def test_a_probe_that_goes_too_far_is_tried_nearer(model: Model) -> None:
+    record = swept(model.with_effect("hose_compliance", {"capacity": CAPACITY}))
+    at = Linearisation.of(model, split([record], [], model, 0.5))
+    (found,) = score(at, [model.library["hose_compliance"]], RecordFeatures())
+    assert found.start["hose_compliance.capacity"] == pytest.approx(CAPACITY, rel=0.3)  # by usual sizes a tenth of it
+
+
+def test_what_a_model_bends_to_explain_the_same_counts_against_it() -> None:
+    straight = Misfit(900.0, 450.0, 1000, 500)
+    bent = replace(straight, prior=40.0)
+    assert bent.total == straight.total + 40.0
+    assert (bent.variance, bent.excess, bent.rms_fit) == (straight.variance, straight.excess, straight.rms_fit)
+
+
+def test_sizes_that_are_shares_are_known_beforehand_to_be_small(model: Model) -> None:
+    known, scale = priors(model), model.library["sensor_scale"].parameters[0]
+    mean, std = known["sensor_scale.scale"]
+    assert (mean, std) == (1.0, pytest.approx(PLAUSIBLE * (scale.default - 1.0)))
+    assert "sensor_scale.scale" not in priors(model.with_effect("sensor_scale"))  # its file's own
+    assert not any(key.startswith(("coulomb_friction.", "hose_compliance.")) for key in known)  # sizes of the plant
