@@ -49,6 +49,7 @@ def test_the_workspace_holds_the_packages() -> None:
         "hydraulic_plant_node",
         "hydraulic_sim",
         "hydraulic_sysid",
+        "hydraulic_workbench",
     ]
 
 
