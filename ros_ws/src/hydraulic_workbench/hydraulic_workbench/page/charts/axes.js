@@ -1,0 +1,53 @@
+// What all plots share: axes that read on light and dark, and a scale that does not tremble.
+import { css } from "./colours.js";
+import { digits } from "../core/format.js";
+
+const FONT = '11.5px system-ui, "DejaVu Sans", sans-serif';
+
+export function axis(more = {}) {
+  return {
+    stroke: () => css("soft"),
+    font: FONT,
+    grid: { stroke: () => css("grid"), width: 1 },
+    ticks: { show: false },
+    gap: 6,
+    ...more,
+  };
+}
+
+/** A value axis as wide as its neighbours', so that plots stand in line. */
+export const valueAxis = (more = {}) => axis({ size: 54, space: 28, values: (_, ticks) => labels(ticks), ...more });
+
+/** Labels of ticks, all with as many places as the distance between them asks for. */
+function labels(ticks) {
+  const step = ticks.length > 1 ? Math.abs(ticks[1] - ticks[0]) : 1;
+  const places = Math.max(0, Math.min(8, -Math.floor(Math.log10(step) + 1e-9)));
+  return ticks.map((tick) => tick.toFixed(places).replace("-", "−"));
+}
+
+export const timeAxis = (more = {}) => axis({ size: 30, space: 70, values: (_, ticks) => labels(ticks).map((text) => `${text} s`), ...more });
+
+/** A range of values that grows at once and shrinks only when much of it is empty. */
+export function steadyRange() {
+  let low = 0;
+  let high = 0;
+  return (_, min, max) => {
+    if (min === null || max === null || !Number.isFinite(min) || !Number.isFinite(max)) return low < high ? [low, high] : [-1, 1];
+    const size = Math.max(max - min, 1e-9, 1e-6 * Math.abs(max));
+    const roomy = size < 0.45 * (high - low);
+    if (!(low < high) || min < low || max > high || roomy) {
+      low = min - 0.1 * size;
+      high = max + 0.1 * size;
+    }
+    return [low, high];
+  };
+}
+
+/** A range with a little room around the values. */
+export function looseRange(_, min, max) {
+  if (min === null || !Number.isFinite(min)) return [-1, 1];
+  const room = 0.06 * Math.max(max - min, 1e-9, 1e-6 * Math.abs(max));
+  return [min - room, max + room];
+}
+
+export const number = (value) => digits(value, 4);
