@@ -26,10 +26,20 @@ function page() {
     ${rail()}
     <main tabindex="-1" id="main">
       ${banners()}
-      ${keyed(tab, VIEWS[tab]())}
+      ${keyed(tab, viewOf(tab))}
     </main>
     ${messages()}
     ${dialogs()}`;
+}
+
+/** A tab that cannot be shown takes nothing else with it: the stop button stays. */
+function viewOf(tab) {
+  try {
+    return VIEWS[tab]();
+  } catch (error) {
+    console.error(error);
+    return html`<p class="notice poor" role="alert">This tab cannot be shown: ${error.message}</p>`;
+  }
 }
 
 function draw() {
@@ -39,6 +49,7 @@ function draw() {
 }
 
 place.replaceChildren();
+if (location.search.includes("token=")) history.replaceState(null, "", location.pathname + location.hash); // not into bookmarks
 onChange(draw);
 addEventListener("hashchange", () => {
   changed();

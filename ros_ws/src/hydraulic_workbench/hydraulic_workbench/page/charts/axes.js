@@ -33,11 +33,11 @@ export function steadyRange() {
   let high = 0;
   return (_, min, max) => {
     if (min === null || max === null || !Number.isFinite(min) || !Number.isFinite(max)) return low < high ? [low, high] : [-1, 1];
-    const size = Math.max(max - min, 1e-9, 1e-6 * Math.abs(max));
+    const size = span(min, max);
     const roomy = size < 0.45 * (high - low);
     if (!(low < high) || min < low || max > high || roomy) {
-      low = min - 0.1 * size;
-      high = max + 0.1 * size;
+      low = (min + max - 1.2 * size) / 2;
+      high = (min + max + 1.2 * size) / 2;
     }
     return [low, high];
   };
@@ -46,8 +46,14 @@ export function steadyRange() {
 /** A range with a little room around the values. */
 export function looseRange(_, min, max) {
   if (min === null || !Number.isFinite(min)) return [-1, 1];
-  const room = 0.06 * Math.max(max - min, 1e-9, 1e-6 * Math.abs(max));
-  return [min - room, max + room];
+  const size = 1.12 * span(min, max);
+  return [(min + max - size) / 2, (min + max + size) / 2];
+}
+
+/** How much values differ; of a constant one, as much as keeps its axis readable. */
+function span(min, max) {
+  const size = Math.max(Math.abs(min), Math.abs(max));
+  return max - min > 1e-7 * size && max > min ? max - min : Math.max(1, 0.02 * size);
 }
 
 export const number = (value) => digits(value, 4);

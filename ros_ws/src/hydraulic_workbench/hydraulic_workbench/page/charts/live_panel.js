@@ -73,7 +73,7 @@ export class LivePanel {
   build(width) {
     const scales = { x: { time: false, auto: false }, y: { auto: true, range: steadyRange() } };
     if (this.spec.second) scales.second = { auto: true, range: steadyRange() };
-    const axes = [timeAxis({ show: this.last }), valueAxis()];
+    const axes = [timeAxis(this.last ? {} : { size: 0, values: () => [] }), valueAxis()];
     if (this.spec.second) axes.push(valueAxis({ scale: "second", side: 1, grid: { show: false } }));
     const last = this.spec.columns.length - 1;
     const series = this.spec.columns.map((column, k) => ({
@@ -157,6 +157,7 @@ export class LivePanel {
     this.spec.columns.forEach((column, k) => {
       const value = time === null ? ring.last(column.key) : ring.at(column.key, time);
       this.values[k].textContent = digits(value * column.display.factor, 4);
+      this.values[k].parentNode.hidden = !this.owner.present.has(column.key);
     });
   }
 

@@ -19,6 +19,7 @@ export class LiveStrips extends HTMLElement {
     this.overlays = [];
     this.pointer = null;
     this.panels = [];
+    this.present = new Set(); // channels that somebody publishes
   }
 
   get paused() {
@@ -58,12 +59,15 @@ export class LiveStrips extends HTMLElement {
       if (!groups.has(column.group)) groups.set(column.group, []);
       groups.get(column.group).push(column);
     }
-    return groups;
+    const order = [...groups.keys()];
+    const rank = (group) => order.indexOf(group.replace("residual_", "")) + (group.startsWith("residual_") ? 0.5 : 0);
+    return new Map([...groups].sort(([a], [b]) => rank(a) - rank(b))); // a residual below what it is the residual of
   }
 
   /** Whether a group of channels has a panel. */
   shows(group) {
     if (this.groups) return this.groups.has(group);
+    if (!this.available().get(group)?.some((column) => this.present.has(column.key))) return false;
     return ["position", "residual_position", "voltage", "pressure"].includes(group);
   }
 
@@ -124,9 +128,20 @@ export class LiveStrips extends HTMLElement {
     }
     if (!(now - this.saidAt < SAID_EVERY_MS)) {
       this.saidAt = now;
+      this.lookWhatIsThere();
       for (const panel of this.panels) panel.say(this.frozen ?? live.ring, this.pointer);
     }
     requestAnimationFrame((later) => this.tick(later));
+  }
+
+  /** Channels come and go with the nodes that publish them: a panel without any is left out. */
+  lookWhatIsThere() {
+    const ring = this.frozen ?? live.ring;
+    const present = live.columns.filter(({ key }) => ring.has(key)).map(({ key }) => key);
+    if (present.length === this.present.size && present.every((key) => this.present.has(key))) return;
+    this.present = new Set(present);
+    const wanted = this.specs().map((spec) => spec.group).join();
+    if (wanted !== this.panels.map((panel) => panel.spec.group).join()) this.arrange();
   }
 
   redraw() {
@@ -202,8 +217,7 @@ export class LiveStrips extends HTMLElement {
 }
 
 function titleOf(group, columns) {
-  const name = columns.length > 1 || group.startsWith("residual") ? group : columns[0].title;
-  const text = name.replaceAll("_", " ");
+  const text = group.startsWith("residual_") ? "residual" : columns.length > 1 ? group.replaceAll("_", " ") : columns[0].title;
   return text[0].toUpperCase() + text.slice(1);
 }
 

@@ -81,6 +81,14 @@ export class SampleRing {
     return all && this.length ? all[this.end - 1] : NaN;
   }
 
+  /** Whether a channel has any value; a look at a few hundred samples tells. */
+  has(name) {
+    const all = this.values.get(name);
+    const step = Math.max(1, Math.floor(this.length / 500));
+    for (let k = this.end - 1; k >= this.start; k -= step) if (all[k] === all[k]) return true;
+    return false;
+  }
+
   /** Value of a channel at the sample nearest to a time. */
   at(name, time) {
     const all = this.values.get(name);

@@ -173,9 +173,9 @@ export class SeriesChart extends HTMLElement {
       ctx.stroke();
       if (!line.title) continue;
       ctx.font = `${11 * devicePixelRatio}px sans-serif`;
-      ctx.textAlign = "right";
+      ctx.textAlign = line.left ? "left" : "right";
       const below = y - bbox.top < 16 * devicePixelRatio;
-      ctx.fillText(line.title, bbox.left + bbox.width - 4, y + (below ? 13 : -4) * devicePixelRatio);
+      ctx.fillText(line.title, line.left ? bbox.left + 4 : bbox.left + bbox.width - 4, y + (below ? 13 : -4) * devicePixelRatio);
     }
     ctx.restore();
   }

@@ -17,21 +17,23 @@ function limitLines(range, factor, name) {
 }
 
 function build({ traces, limits = {} }) {
-  const line = (key, title, kind, colour) => ({ title, time: traces.time, value: traces[key], factor: DISPLAY[kind].factor, colour });
-  const has = (key) => traces[key]?.some((value) => value !== null);
-  const one = (title, kind, series, lines) => ({ title, unit: DISPLAY[kind].unit, sync: "rehearsal", height: 165, series, lines });
-  const result = [
-    one("Position", "position", [line("position", "position", "position", "curve-1")],
-      [...limitLines(limits.travel, 1000, "limit"), ...limitLines(limits.stroke, 1000, "end of stroke").map((all) => ({ ...all, colour: "soft" }))]),
-    one("Drive", "drive", [line("drive", "drive", "drive", "curve-6")],
-      Number.isFinite(limits.drive) ? limitLines([-limits.drive, limits.drive], 1, "limit") : []),
-  ];
-  if (has("pressure_a") || has("pressure_b")) {
-    const series = ["a", "b"].filter((side) => has(`pressure_${side}`))
-      .map((side, k) => line(`pressure_${side}`, `pressure ${side.toUpperCase()}`, "pressure", ["curve-1", "curve-3"][k]));
-    result.splice(1, 0, one("Pressures", "pressure", series, limitLines(limits.pressure, 1e-5, "limit")));
-  }
-  return result;
+  const has = (key) => traces[key]?.value.some((value) => value !== null);
+  const line = (key, title, kind, colour) => ({
+    title, time: traces[key].time, value: traces[key].value, factor: DISPLAY[kind].factor, colour,
+  });
+  const one = (title, kind, keys, lines) => {
+    const colours = kind === "drive" ? ["curve-6"] : ["curve-1", "curve-3"];
+    const series = Object.entries(keys).filter(([key]) => has(key)).map(([key, name], k) => line(key, name, kind, colours[k]));
+    return { title, unit: DISPLAY[kind].unit, sync: "rehearsal", height: 165, series, lines };
+  };
+  const stroke = limitLines(limits.stroke, 1000, "end of stroke").map((all) => ({ ...all, colour: "soft", left: true }));
+  const drive = Number.isFinite(limits.drive) ? [-limits.drive, limits.drive] : null;
+  return [
+    one("Position", "position", { position: "position" }, [...limitLines(limits.travel, 1000, "limit"), ...stroke]),
+    one("Pressures", "pressure", { pressure_a: "pressure A", pressure_b: "pressure B" }, limitLines(limits.pressure, 1e-5, "limit")),
+    one("Velocity", "velocity", { velocity: "velocity" }, []),
+    one("Drive", "drive", { drive: "drive" }, limitLines(drive, 1, "limit")),
+  ].filter((chart) => chart.series.length);
 }
 
 export function rehearsalCharts(doc) {
