@@ -21,6 +21,7 @@ from hydraulic_workbench.processes import Processes, nicer
 from hydraulic_workbench.progress_log import ProgressLog
 from hydraulic_workbench.verbs_of_jobs import VERBS, Asked, command
 
+PACKAGE = "hydraulic_sysid"
 NICE = 10  # the plant and what drives it come first
 LOG, NOTE = "output.log", "job.json"
 _LOOK_S = 0.15
@@ -60,7 +61,7 @@ class Job:
                 "residual")  # fmt: skip
         good = None if self.phase != "finished" else self.exit_code == OK
         run = self.id if self.phase == "finished" else None
-        shown = " ".join(["./bench run hydraulic_sysid", *map(shlex.quote, self.line)])
+        shown = " ".join([f"./bench run {PACKAGE}", *map(shlex.quote, self.line)])
         return {key: getattr(self, key) for key in same} | {
             "good": good, "run": run, "command": shown, "seconds": round(self.seconds, 2)
         }  # fmt: skip
@@ -106,11 +107,11 @@ class Jobs:
         """
         number = f"{len(list(self._folder.runs.iterdir())) + 1:03d}"
         out = self._folder.new(self._folder.runs, f"{number}-{verb}")
-        module, line = command(verb, asked, out)
+        line = command(verb, asked, out)
         out.mkdir()
-        job = Job(out.name, verb, title, out, [module.rpartition(".")[2], *line[:-1]], model, records)
+        job = Job(out.name, verb, title, out, line, model, records)
         self._jobs[job.id] = job
-        task = asyncio.create_task(self._run(job, module, line))
+        task = asyncio.create_task(self._run(job))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         self._tell(job)
@@ -142,7 +143,7 @@ class Jobs:
                 job.phase = "interrupted"
                 self._note(job)
 
-    async def _run(self, job: Job, module: str, line: list[str]) -> None:
+    async def _run(self, job: Job) -> None:
         async with self._lanes[VERBS[job.verb].heavy]:
             if job.cancelled:
                 job.phase = "cancelled"
@@ -151,7 +152,7 @@ class Jobs:
             job.phase, begun = "running", time.monotonic()
             self._note(job)
             log = ProgressLog(job.folder / LOG)
-            job.child = self._processes.start(job.verb, module, *line, log=job.folder / LOG)
+            job.child = self._processes.start(job.verb, PACKAGE, *job.line, "--progress", log=job.folder / LOG)
             nicer(job.child, NICE)
             while job.child.exit_code is None:
                 await asyncio.sleep(_LOOK_S)
@@ -161,12 +162,12 @@ class Jobs:
             job.exit_code, job.child = job.child.exit_code, None
         wrote = any(file.name != NOTE for file in job.folder.glob("*.json"))
         done = wrote and job.exit_code in (OK, NEGATIVE)
+        if done:
+            await self._finished(job)
         job.phase = "finished" if done else "cancelled" if job.cancelled else "failed"
-        job.error = "" if job.phase == "finished" else log.words()
+        job.error = "" if done else log.words()
         job.progress = ""
         self._note(job)
-        if job.phase == "finished":
-            await self._finished(job)
         self._tell(job)
 
     def _take(self, job: Job, news: list[dict[str, Any]]) -> None:

@@ -113,7 +113,7 @@ class Verb:
 VERBS: dict[str, Verb] = {
     "calibrate": Verb(lambda asked: _model_and_records(asked, "--holdout-record"), leads_to_model="calibrated"),
     "check": Verb(lambda asked: ["--check", *_model_and_records(asked)], heavy=False),
-    "compare": Verb(_model_and_records, heavy=False),
+    "compare": Verb(lambda asked: [*_model_and_records(asked), "--samples"], heavy=False),
     "locate": Verb(_model_and_records, heavy=False),
     "diagnose": Verb(_diagnose),
     "add": Verb(_add, leads_to_model="added"),
@@ -122,19 +122,19 @@ VERBS: dict[str, Verb] = {
     "design": Verb(_design, heavy=False),
     "rehearse": Verb(_rehearse, heavy=False),
 }
-MODULES = {"check": "calibrate"}
+OTHERWISE = {"check": "calibrate"}
 """Verbs that are another one with an option."""
 
 
-def command(verb: str, asked: Asked, out: Path) -> tuple[str, list[str]]:
-    """Module and arguments of a run.
+def command(verb: str, asked: Asked, out: Path) -> list[str]:
+    """The command line of a run, after ``python -m hydraulic_sysid``.
 
     :raises WorkbenchError: no such verb, or what it needs is not there.
     """
     if verb not in VERBS:
         raise WorkbenchError(f"verb is {verb!r}; allowed are {', '.join(VERBS)}", "verb")
     line = VERBS[verb].line(asked)
-    return f"hydraulic_sysid.verbs.{MODULES.get(verb, verb)}", [*line, "--out", str(out), "--progress"]
+    return [OTHERWISE.get(verb, verb), *line, "--out", str(out)]
 
 
 def _number(value: Any, name: str) -> float:
