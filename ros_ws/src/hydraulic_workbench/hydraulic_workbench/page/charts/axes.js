@@ -16,12 +16,13 @@ export function axis(more = {}) {
 }
 
 /** A value axis as wide as its neighbours', so that plots stand in line. */
-export const valueAxis = (more = {}) => axis({ size: 54, space: 28, values: (_, ticks) => labels(ticks), ...more });
+export const valueAxis = (more = {}) => axis({ size: 54, space: 22, values: (_, ticks) => labels(ticks), ...more });
 
 /** Labels of ticks, all with as many places as the distance between them asks for. */
 function labels(ticks) {
   const step = ticks.length > 1 ? Math.abs(ticks[1] - ticks[0]) : 1;
-  const places = Math.max(0, Math.min(8, -Math.floor(Math.log10(step) + 1e-9)));
+  let places = 0;
+  while (places < 8 && Math.abs(step * 10 ** places - Math.round(step * 10 ** places)) > 1e-3) places += 1;
   return ticks.map((tick) => tick.toFixed(places).replace("-", "−"));
 }
 
@@ -44,9 +45,9 @@ export function steadyRange() {
 }
 
 /** A range with a little room around the values. */
-export function looseRange(_, min, max) {
+export function looseRange(_, min, max, room = 0.12) {
   if (min === null || !Number.isFinite(min)) return [-1, 1];
-  const size = 1.12 * span(min, max);
+  const size = (1 + room) * span(min, max);
   return [(min + max - size) / 2, (min + max + size) / 2];
 }
 

@@ -85,7 +85,7 @@ export class SeriesChart extends HTMLElement {
         button.setAttribute("aria-pressed", String(show));
         this.plot?.setSeries(k + 1, { show });
       };
-      head.append(button);
+      if (one.title) head.append(button);
       return value;
     });
     return head;
@@ -105,7 +105,7 @@ export class SeriesChart extends HTMLElement {
       width, height: spec.height ?? 190, legend: { show: false }, padding: [6, 10, 0, 0],
       scales: {
         x: { time: false },
-        y: { range: (plot, min, max) => looseRange(plot, Math.min(min, ...lines), Math.max(max, ...lines)) },
+        y: { range: (plot, min, max) => looseRange(plot, Math.min(min, ...lines), Math.max(max, ...lines), lines.length > 2 ? 0.34 : 0.12) },
       },
       axes: [timeAxis(), valueAxis()],
       series: [{}, ...this.shown.map((one, k) => ({
@@ -174,7 +174,8 @@ export class SeriesChart extends HTMLElement {
       if (!line.title) continue;
       ctx.font = `${11 * devicePixelRatio}px sans-serif`;
       ctx.textAlign = line.left ? "left" : "right";
-      const below = y - bbox.top < 16 * devicePixelRatio;
+      const upper = y < bbox.top + bbox.height / 2;
+      const below = line.left ? !upper : upper; // a limit's name inside its limit, that of the stroke's end outside
       ctx.fillText(line.title, line.left ? bbox.left + 4 : bbox.left + bbox.width - 4, y + (below ? 13 : -4) * devicePixelRatio);
     }
     ctx.restore();

@@ -4,6 +4,8 @@ import { state, update } from "../core/store.js";
 import { enable, open, operates, plant, plantRuns, runs } from "../core/actions.js";
 import { words } from "../core/format.js";
 import { currentTab } from "./tabs.js";
+import { answerGuess } from "./plant_running.js";
+import { besidePlant } from "./timeline.js";
 import { addEffect, bestAddable, diagnoseRecord, lastDiagnosis } from "./diagnosis_steps.js";
 
 /** What is next: {text, does, run}; null where nothing is to be said. */
@@ -13,7 +15,7 @@ function next() {
   const experiment = state.bench.experiment || { phase: "idle" };
   const busy = state.jobs.find((job) => runs(job) && ["diagnose", "add", "calibrate"].includes(job.verb));
   if (busy) return currentTab() === "diagnose" ? null : step(`${words(busy.verb)} is running.`, "Watch", () => open("diagnose"));
-  const found = afterDiagnosis();
+  const found = afterDiagnosis() ?? afterAdding();
   if (found) return found;
   if (now.stopped && plantRuns()) return null; // the banner of the stop says it
   if (!plantRuns()) return state.records.length ? null : noPlant();
@@ -37,6 +39,18 @@ function afterDiagnosis() {
   const best = bestAddable(job);
   if (!best) return null;
   return step(`The diagnosis names ${words(best)}.`, `Add ${words(best)}`, () => addEffect(job, best));
+}
+
+/** An effect was added and only noise is left: say so where a guess is open, then look at it live. */
+function afterAdding() {
+  const current = state.timeline.steps.find((one) => one.current);
+  if (current?.what !== "added" || !(current.error_after < 1.1)) return null;
+  const left = `With ${words(current.effect)} the error is at the noise.`;
+  if (state.bench.guess?.phase === "hidden" || state.bench.guess?.phase === "guessed") {
+    if (!state.bench.guess.right) return step(left, `Answer: ${words(current.effect)}`, () => answerGuess(current.effect));
+  }
+  if (!plantRuns() || state.bench.live_model?.model === current.model) return null;
+  return step(`${left} Watch it follow the plant.`, "Run it beside the plant", () => besidePlant(current.model));
 }
 
 const step = (text, does, run) => ({ text, does, run });

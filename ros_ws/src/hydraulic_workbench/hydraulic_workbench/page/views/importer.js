@@ -122,7 +122,8 @@ export function importer() {
       ${shown ? html`<span class="chip">${shown.kind}</span>` : nothing}</header>
     ${!shown ? html`<progress max=${importing.files.length} value=${importing.sent} aria-label="Sent"></progress>` : html`
       ${sample(shown)}
-      ${shown.needs_map && importing.map ? columnsForm(importing.map, shown, mapChanged) : nothing}
+      ${!importing.map && shown.kind === "table" && shown.guess ? html`<button class="small quiet" @click=${() => { importing.map = structuredClone(shown.guess); mapChanged(); }}>Name the columns myself</button>` : nothing}
+      ${importing.map ? columnsForm(importing.map, shown, mapChanged) : nothing}
       ${shown.problem ? html`<p class="notice fair" style="margin-top:10px">${shown.problem}</p>` : nothing}
       ${ready ? html`<p class="notice good" style="margin-top:10px">${duration(shown.record.duration)} at ${digits(1 / shown.record.sampling_time, 4)} Hz, ${shown.record.samples} samples: ${shown.record.channels.join(", ").replaceAll("_", " ")}</p>` : nothing}
       ${curves(shown)}`}

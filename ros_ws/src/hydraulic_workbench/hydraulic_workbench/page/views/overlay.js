@@ -8,7 +8,7 @@ import { words } from "../core/format.js";
 import "../charts/series_chart.js";
 
 const POINTS = 1600;
-const DEFAULT = ["position", "drive", "pressure_a", "pressure_b"];
+const DEFAULT = ["position", "drive", "command", "pressure_a", "pressure_b"];
 const COLOURS = ["curve-1", "curve-2", "curve-3"];
 const now = { key: "", charts: [], busy: false, channels: null, span: null, align: false };
 let timer = null;
@@ -22,8 +22,10 @@ function items() {
 const available = () => [...new Set(state.shownRecords.flatMap((id) => recordOf(id)?.channels ?? []))];
 const channels = () => (now.channels ?? DEFAULT).filter((name) => available().includes(name));
 
+const wanted = () => JSON.stringify([items(), channels(), now.span]);
+
 async function fetchAll() {
-  const key = JSON.stringify([items(), channels(), now.span]);
+  const key = wanted();
   if (key === now.key) return;
   now.key = key;
   now.busy = true;
@@ -75,7 +77,7 @@ function toggle(name) {
 export function overlayView() {
   queueMicrotask(fetchAll);
   const names = state.shownRecords.map((id) => recordOf(id)?.name).filter(Boolean);
-  return html`<section class="card" aria-label="Overlay" aria-busy=${now.busy}><header><h2>${names.join(" over ")}</h2>
+  return html`<section class="card" aria-label="Overlay" aria-busy=${now.busy || wanted() !== now.key}><header><h2>${names.join(" over ")}</h2>
       ${now.busy ? html`<i class="spinner"></i>` : nothing}
       ${now.span ? html`<button class="small" @click=${whole}>Whole record</button>` : nothing}
       <select aria-label="Model over the record" id="overlay-model" @change=${(event) => update({ overlayModel: event.target.value })}>

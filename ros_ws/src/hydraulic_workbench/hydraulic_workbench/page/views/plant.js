@@ -76,7 +76,8 @@ function simulatorCard(choices) {
   </section>`;
 }
 
-function virtualCard({ buses, models }) {
+function virtualCard({ buses: all, models }) {
+  const buses = all.map((bus) => bus.name ?? bus);
   chosen.bus ??= buses[0];
   chosen.canModel ??= models[0]?.id;
   return html`<section class="card choice">

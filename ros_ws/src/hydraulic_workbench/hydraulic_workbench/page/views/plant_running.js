@@ -25,8 +25,9 @@ export function faults() {
 
 let answer = "";
 
-async function answerGuess() {
-  const result = await attempt(() => post("/api/guess/answer", { effect: answer }));
+/** Say what the simulator hides. */
+export async function answerGuess(effect) {
+  const result = await attempt(() => post("/api/guess/answer", { effect }));
   if (result) say(result.text, result.right ? "good" : "info");
 }
 
@@ -47,7 +48,7 @@ export function guess() {
         <option value="">Choose an effect …</option>
         ${effects.map((effect) => html`<option value=${effect.name} ?selected=${effect.name === answer}>${effect.title || words(effect.name)}</option>`)}
       </select>
-      <button ?disabled=${!answer || !operates()} @click=${answerGuess}>Answer</button>
+      <button ?disabled=${!answer || !operates()} @click=${() => answerGuess(answer)}>Answer</button>
       <button class="quiet" ?disabled=${!operates()} @click=${() => attempt(() => post("/api/guess/reveal"))}>Tell me</button>
     </div></div>`;
 }

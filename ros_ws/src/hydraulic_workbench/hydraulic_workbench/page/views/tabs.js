@@ -21,8 +21,8 @@ export const currentTab = () => {
 function runningJob(job) {
   return html`<div class="job">
     <div class="row"><i class="spinner"></i><span class="what" title=${job.title}>${words(job.verb)}</span>
-      <button class="small quiet" ?disabled=${!operates()} @click=${() => cancelJob(job)}
-        aria-label=${`Cancel ${job.title}`}>Cancel</button></div>
+      <button class="small quiet icon" ?disabled=${!operates()} @click=${() => cancelJob(job)}
+        aria-label=${`Cancel ${job.title}`} title="Cancel">×</button></div>
     <span class="says" title=${job.progress || ""}>${job.progress || job.phase}</span>
   </div>`;
 }

@@ -10,7 +10,8 @@ import { undoIcon } from "../core/icons.js";
 const undo = () => attempt(() => post("/api/timeline/undo"));
 const go = (step) => attempt(() => post("/api/timeline/go", { index: step.index }));
 
-async function beside(model) {
+/** Let a model run beside the plant. */
+export async function besidePlant(model) {
   if (await attempt(() => post("/api/live_model", { model }))) {
     say("It runs beside the plant: watch the residual.", "good", { text: "Live", run: () => open("live") });
   }
@@ -43,7 +44,7 @@ function item(step) {
       <div class="row">
         ${step.current ? html`<span class="chip accent">current</span>` : html`<button class="small quiet" ?disabled=${!operates()} @click=${() => go(step)}>Go back to it</button>`}
         ${step.run ? html`<button class="small quiet" @click=${() => openRun(step)}>Result</button>` : nothing}
-        ${step.current && plantRuns() ? html`<button class="small" id="beside" ?disabled=${!operates()} @click=${() => beside(step.model)}>Run beside the plant</button>` : nothing}
+        ${step.current && plantRuns() ? html`<button class="small" id="beside" ?disabled=${!operates()} @click=${() => besidePlant(step.model)}>Run beside the plant</button>` : nothing}
       </div>
     </div></li>`;
 }
