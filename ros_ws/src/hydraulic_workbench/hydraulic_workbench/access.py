@@ -12,7 +12,7 @@ from aiohttp.typedefs import Handler
 from hydraulic_workbench.errors import NotAllowedError
 
 OPERATE, WATCH = "operate", "watch"
-ROLE = "role"
+ROLE = web.RequestKey("role", str)
 """Key of a request under which its visitor's role stands."""
 _METHODS_THAT_READ = ("GET", "HEAD", "OPTIONS")
 HOSTS = ("127.0.0.1", "localhost")

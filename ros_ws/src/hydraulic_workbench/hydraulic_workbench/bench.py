@@ -74,6 +74,7 @@ class Bench:
         self.timeline = Timeline(self._timeline_changed)
         self.guess: Guess | None = None
         self._watcher: asyncio.Task[None] | None = None
+        self.ready = asyncio.Event()
 
     async def begin(self) -> None:
         """Read what there is, and begin to watch."""
@@ -90,6 +91,7 @@ class Bench:
             preset = next(m for m in self.library.models if m.name == DEFAULT_MODEL)
             self.timeline.add(Step("chosen", str(preset.file)))
         self._show_current()
+        self.ready.set()
 
     async def end(self) -> None:
         """Bring all to rest: what commands first, the plant last."""
@@ -152,7 +154,7 @@ class Bench:
         what = plan.name if plan else " ".join(filter(None, [asked.get("effect"), asked.get("signal")]))
         of = f" on {', '.join(r.name for r in records)}" if records else ""
         title = f"{verb.replace('_', ' ')}{' ' if what else ''}{what}{of}"
-        return self.jobs.start(verb, title, wanted, model.id, [r.id for r in records])
+        return self.jobs.start(verb, title, wanted, model.id, [r.id for r in records], plan.id if plan else None)
 
     async def _job_finished(self, job: Job) -> None:
         for file in sorted(job.folder.glob("*.yaml")):

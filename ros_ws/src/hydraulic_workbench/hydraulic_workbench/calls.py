@@ -55,7 +55,7 @@ class Graph(Protocol):
     async def parameters(self, node: str) -> list[NodeParameter]:
         """All parameters of a node."""
 
-    async def set_parameters(self, node: str, values: dict[str, Any]) -> Said:
+    async def set_parameters(self, node: str, values: dict[str, Any], patience: float = 5.0) -> Said:
         """Set parameters of a node, all or none."""
 
     def publishers(self, topic: str) -> int:

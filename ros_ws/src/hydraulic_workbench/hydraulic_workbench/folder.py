@@ -54,7 +54,8 @@ class Folder:
     def new(self, parent: Path, name: str) -> Path:
         """A path that is not there yet, made from a name."""
         safe = re.sub(r"[^A-Za-z0-9._-]+", "_", name).strip("._") or "unnamed"
-        known = (safe, *(f"{safe}_{number}" for number in range(2, 10_000)))
+        stem, dot, kind = safe.partition(".")
+        known = (safe, *(f"{stem}_{number}{dot}{kind}" for number in range(2, 10_000)))
         return next(parent / one for one in known if not (parent / one).exists())
 
     def recall(self) -> dict[str, Any]:

@@ -39,6 +39,7 @@ class Job:
     line: list[str]
     model: str | None = None
     records: list[str] = field(default_factory=list)
+    plan: str | None = None
     phase: str = "queued"
     progress: str = ""
     error: str = ""
@@ -57,7 +58,7 @@ class Job:
 
     def document(self) -> dict[str, Any]:
         """For the page."""
-        same = ("id", "verb", "title", "model", "records", "phase", "progress", "error", "exit_code", "created",
+        same = ("id", "verb", "title", "model", "records", "plan", "phase", "progress", "error", "exit_code", "created",
                 "residual")  # fmt: skip
         good = None if self.phase != "finished" else self.exit_code == OK
         run = self.id if self.phase == "finished" else None
@@ -100,7 +101,9 @@ class Jobs:
         """Those that the page lists."""
         return list(reversed(self._jobs.values()))[:_KEPT]
 
-    def start(self, verb: str, title: str, asked: Asked, model: str | None, records: list[str]) -> Job:
+    def start(
+        self, verb: str, title: str, asked: Asked, model: str | None, records: list[str], plan: str | None = None
+    ) -> Job:
         """Have a verb run as soon as those before it in its lane are done.
 
         :raises WorkbenchError: it cannot be run like that.
@@ -109,8 +112,9 @@ class Jobs:
         out = self._folder.new(self._folder.runs, f"{number}-{verb}")
         line = command(verb, asked, out)
         out.mkdir()
-        job = Job(out.name, verb, title, out, line, model, records)
+        job = Job(out.name, verb, title, out, line, model, records, plan)
         self._jobs[job.id] = job
+        self._note(job)
         task = asyncio.create_task(self._run(job))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -147,6 +151,7 @@ class Jobs:
         async with self._lanes[VERBS[job.verb].heavy]:
             if job.cancelled:
                 job.phase = "cancelled"
+                self._note(job)
                 self._tell(job)
                 return
             job.phase, begun = "running", time.monotonic()
@@ -185,6 +190,6 @@ class Jobs:
         self._hub.tell("job", job=job.document())
 
     def _note(self, job: Job) -> None:
-        kept = ("id", "verb", "title", "line", "model", "records", "phase", "error", "exit_code", "created", "seconds",
+        kept = ("id", "verb", "title", "line", "model", "records", "plan", "phase", "error", "exit_code", "created", "seconds",
                 "residual", "candidates")  # fmt: skip
         write_text(job.folder / NOTE, json.dumps({key: getattr(job, key) for key in kept}) + "\n")

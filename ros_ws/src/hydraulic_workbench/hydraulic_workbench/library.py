@@ -82,7 +82,7 @@ class Library:
             for bag in sorted({meta.parent for meta in place.glob("*/metadata.yaml")}):
                 await self.add_record(bag, source)
             for table in sorted(file for kind in _TABLES for file in place.glob(kind)):
-                if place.name == self._folder.records.name:
+                if place == self._folder.records or self._folder.root not in (place, *place.parents):
                     await self.add_record(table, source, map_of(table))
             for model in sorted(place.glob("model.yaml")):
                 await self.add_model(model, source)

@@ -82,7 +82,7 @@ class Plant:
         self._child = self._processes.start("plant", MODULES[chosen.kind], "--ros-args", *settings)
         if chosen.hidden:  # told by a call, since a command line is for all to read
             said = await self._asked_while_alive(
-                self._graph.set_parameters(PLANT_NODE, {"extra_effects": chosen.hidden_text()})
+                self._graph.set_parameters(PLANT_NODE, {"extra_effects": chosen.hidden_text()}, START_S)
             )
             if not said.ok:
                 raise WorkbenchError(f"the simulator refuses the hidden effects: {said.message}", "hidden")

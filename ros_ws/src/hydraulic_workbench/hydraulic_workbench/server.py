@@ -6,6 +6,7 @@ import socket
 from dataclasses import dataclass
 
 from aiohttp import web
+from aiohttp.typedefs import Handler
 
 from hydraulic_workbench import routes
 from hydraulic_workbench.access import HOSTS, OPERATE, WATCH, Access
@@ -16,6 +17,7 @@ from hydraulic_workbench.routes.general import ACCESS
 
 ADDRESS = HOSTS[0]
 PORT = 8642
+ALWAYS = ("/api/state", "/api/stop")
 _ATTEMPTS = 50
 _SHUTDOWN_S = 2.0
 
@@ -49,12 +51,21 @@ class Server:
 
     async def begin(self) -> None:
         """Serve from now on."""
-        app = web.Application(middlewares=[errors, self.access.middleware], client_max_size=LARGEST_BODY)
+        app = web.Application(
+            middlewares=[errors, self.access.middleware, self._wait_until_ready], client_max_size=LARGEST_BODY
+        )
         app[ACCESS] = self.access
         routes.add_all(app, self.bench)
         self.runner = web.AppRunner(app, access_log=None, shutdown_timeout=_SHUTDOWN_S)
         await self.runner.setup()
         await web.SockSite(self.runner, self.socket).start()
+
+    @web.middleware
+    async def _wait_until_ready(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """What is asked before the folder has been read waits; to stop never waits."""
+        if request.path.startswith("/api/") and request.path not in ALWAYS:
+            await self.bench.ready.wait()
+        return await handler(request)
 
     async def end(self) -> None:
         """Serve no more."""

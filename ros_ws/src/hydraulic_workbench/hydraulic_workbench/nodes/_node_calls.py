@@ -67,11 +67,11 @@ class NodeCalls:
             for name, value, descriptor in zip(names, values, described, strict=True)
         ]
 
-    async def set_parameters(self, node: str, values: dict[str, Any]) -> Said:
+    async def set_parameters(self, node: str, values: dict[str, Any], patience: float = 5.0) -> Said:
         """See `calls.Graph`."""
         rows = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
         kind, name = "rcl_interfaces/srv/SetParametersAtomically", f"{node}/set_parameters_atomically"
-        result = (await self._call(kind, name, 5.0, parameters=rows)).result
+        result = (await self._call(kind, name, patience, parameters=rows)).result
         return Said(bool(result.successful), str(result.reason))
 
     def _client(self, kind: str, name: str) -> Any:

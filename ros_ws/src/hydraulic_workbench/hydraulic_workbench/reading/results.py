@@ -12,7 +12,7 @@ from hydraulic_sysid.data.decimation import envelope
 from hydraulic_sysid.data.results import plain, read_folder, verb_of
 from hydraulic_workbench.errors import UnknownError, WorkbenchError
 
-BULKY = ("drive", "spectra", "error_growth", "spectrum", "lag", "cross_lag", "autocorrelation",
+BULKY = ("spectra", "error_growth", "spectrum", "lag", "cross_lag", "autocorrelation",
          "exact_autocorrelation", "cross_correlation", "software", "description")  # fmt: skip
 """Entries that only figures need; those that the page draws itself stay."""
 SAMPLES = "samples.npz"
@@ -42,7 +42,7 @@ def document(folder: Path, whole: bool) -> dict[str, Any]:
         return found
     slim: dict[str, Any] = _without(found)
     if verb_of(found) == "compare":  # as large as the records
-        slim["records"] = [{k: v for k, v in record.items() if k != "traces"} for record in slim["records"]]
+        slim["records"] = [{k: v for k, v in r.items() if k not in ("traces", "drive")} for r in slim["records"]]
     return slim
 
 
