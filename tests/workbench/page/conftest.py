@@ -121,6 +121,8 @@ def picture() -> Callable[..., None]:
     PICTURES.mkdir(parents=True, exist_ok=True)
 
     def take(page: Any, name: str, whole: bool = True) -> None:
+        if whole:
+            page.evaluate("scrollTo(0, 0)")
         page.screenshot(path=PICTURES / f"{name}.png", full_page=whole)
 
     return take

@@ -49,7 +49,9 @@ def test_a_controller_is_tuned_live_and_taken_back(page: Any, picture: Callable[
     slider = page.locator(".gains .slider input").first
     value = page.locator(".gains .slider b").first
     before = value.inner_text()
-    slider.evaluate("e => { e.value = Number(e.min) + 0.7 * (e.max - e.min); e.dispatchEvent(new Event('input', {bubbles: true})); }")
+    slider.evaluate(
+        "e => { e.value = Number(e.min) + 0.7 * (e.max - e.min); e.dispatchEvent(new Event('input', {bubbles: true})); }"
+    )
     assert value.inner_text() != before
     page.click("#undo-gains:not([disabled])")
     until(page, "before => document.querySelector('.gains .slider b').innerText === before", before)

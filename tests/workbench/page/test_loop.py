@@ -97,7 +97,7 @@ def test_locate_names_a_subsystem(page: Any, picture: Callable[..., None]) -> No
 
 
 def test_figures_of_the_report_open_on_demand(page: Any, picture: Callable[..., None]) -> None:
-    loaded = "performance.getEntriesByType('resource').some(({name}) => name.includes('plotly'))"
+    loaded = "performance.getEntriesByType('resource').some(({name}) => name.includes('plotly.min'))"
     assert not page.evaluate(loaded)
     page.click("[aria-label=Report] summary >> nth=0")
     page.wait_for_selector("plotly-figure .main-svg")

@@ -90,10 +90,12 @@ def test_two_records_and_a_model_over_each_other(bench: Any, picture: Callable[.
     boxes = page.locator("table.records input[type=checkbox]")
     boxes.nth(0).check()
     boxes.nth(1).check()
-    page.wait_for_selector("[aria-label=Overlay][aria-busy=false] series-chart canvas")
-    assert page.locator("[aria-label=Overlay] series-chart").first.locator(".legend").count() == 2
+    drawn = (
+        "count => document.querySelectorAll('[aria-label=Overlay] series-chart:first-of-type .legend').length === count"
+    )
+    until(page, drawn, 2)
     page.select_option("#overlay-model", label="sample_bench")
-    until(page, "document.querySelectorAll('[aria-label=Overlay] series-chart:first-of-type .legend').length === 3")
+    until(page, drawn, 3)
     picture(page, "records-overlay")
 
 

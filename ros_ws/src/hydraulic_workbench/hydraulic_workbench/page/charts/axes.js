@@ -29,12 +29,12 @@ function labels(ticks) {
 export const timeAxis = (more = {}) => axis({ size: 30, space: 70, values: (_, ticks) => labels(ticks).map((text) => `${text} s`), ...more });
 
 /** A range of values that grows at once and shrinks only when much of it is empty. */
-export function steadyRange() {
+export function steadyRange(least = () => 0) {
   let low = 0;
   let high = 0;
   return (_, min, max) => {
     if (min === null || max === null || !Number.isFinite(min) || !Number.isFinite(max)) return low < high ? [low, high] : [-1, 1];
-    const size = span(min, max);
+    const size = Math.max(span(min, max), least());
     const roomy = size < 0.45 * (high - low);
     if (!(low < high) || min < low || max > high || roomy) {
       low = (min + max - 1.2 * size) / 2;

@@ -4,6 +4,8 @@ import { colourOf, css } from "./colours.js";
 import { steadyRange, timeAxis, valueAxis } from "./axes.js";
 import { digits } from "../core/format.js";
 
+const LEAST = { mm: 2, "mm/s": 20, V: 1, bar: 4, kN: 0.5, "%": 2 }; // height of an axis, in the unit shown
+
 const dashed = (key) => (key.startsWith("reference") || key === "command" ? [5, 4] : undefined);
 
 export class LivePanel {
@@ -69,10 +71,17 @@ export class LivePanel {
     return this.spec.second ? ["curve-1", "curve-2"][k] : colourOf(column.key, k);
   }
 
+  /** The range of an axis; while the view follows, noise alone does not fill it. */
+  range(k) {
+    const { display, group } = this.spec.columns[k];
+    const least = (LEAST[display.unit] ?? 0) * (group.startsWith("residual") ? 0.1 : 1);
+    return steadyRange(() => (this.owner.paused ? 0 : least));
+  }
+
   /** Make the plot once the place it stands in has a width. */
   build(width) {
-    const scales = { x: { time: false, auto: false }, y: { auto: true, range: steadyRange() } };
-    if (this.spec.second) scales.second = { auto: true, range: steadyRange() };
+    const scales = { x: { time: false, auto: false }, y: { auto: true, range: this.range(0) } };
+    if (this.spec.second) scales.second = { auto: true, range: this.range(1) };
     const axes = [timeAxis(this.last ? {} : { size: 0, values: () => [] }), valueAxis()];
     if (this.spec.second) axes.push(valueAxis({ scale: "second", side: 1, grid: { show: false } }));
     const last = this.spec.columns.length - 1;
@@ -96,22 +105,27 @@ export class LivePanel {
       hooks: {
         setSelect: [(plot) => {
           if (plot.select.width < 6) return;
+          const own = owner.dragged === plot; // the others follow by the time, not by the place
           const from = plot.posToVal(plot.select.left, "x");
           const to = plot.posToVal(plot.select.left + plot.select.width, "x");
           plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-          owner.zoom(from, to);
+          if (own) owner.zoom(from, to);
         }],
         setCursor: [(plot) => owner.pointed(plot.cursor.left >= 0 ? plot.posToVal(plot.cursor.left, "x") : null)],
         draw: [(plot) => this.drawMarks(plot)],
       },
     }, [[], ...this.spec.columns.map(() => [])], this.body);
+    this.plot.over.addEventListener("pointerdown", (event) => {
+      owner.dragged = this.plot;
+      this.downAt = event.clientX;
+    });
     this.plot.over.addEventListener("click", (event) => this.mark(event));
     this.plot.over.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
   }
 
   mark(event) {
     const time = this.plot.posToVal(event.offsetX, "x");
-    if (Math.abs(event.movementX) < 3) this.owner.mark(time, event.shiftKey);
+    if (Math.abs(event.clientX - this.downAt) < 5) this.owner.mark(time, event.shiftKey);
   }
 
   wheel(event) {

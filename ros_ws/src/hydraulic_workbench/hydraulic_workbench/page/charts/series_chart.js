@@ -6,6 +6,7 @@ import { looseRange, timeAxis, valueAxis } from "./axes.js";
 import { digits } from "../core/format.js";
 
 const groups = new Map(); // sync → charts
+let dragged = null; // the plot in which the pointer went down
 
 export class SeriesChart extends HTMLElement {
   /**
@@ -101,7 +102,7 @@ export class SeriesChart extends HTMLElement {
   make(width) {
     const { spec } = this;
     const lines = (spec.lines ?? []).map((line) => line.value);
-    return new uPlot({
+    const plot = new uPlot({
       width, height: spec.height ?? 190, legend: { show: false }, padding: [6, 10, 0, 0],
       scales: {
         x: { time: false },
@@ -110,7 +111,7 @@ export class SeriesChart extends HTMLElement {
       axes: [timeAxis(), valueAxis()],
       series: [{}, ...this.shown.map((one, k) => ({
         stroke: () => css(one.colour ?? `curve-${k + 1}`), width: one.width ?? 1.5, dash: one.dash,
-        points: { show: false }, spanGaps: true,
+        ...(one.points ? { paths: () => null, points: { show: true, size: 4 } } : { points: { show: false } }), spanGaps: true,
       }))],
       cursor: {
         sync: spec.sync ? { key: spec.sync, setSeries: false } : undefined, y: false, points: { size: 6 },
@@ -124,10 +125,16 @@ export class SeriesChart extends HTMLElement {
         setCursor: [(plot) => this.say(plot.cursor.idx)],
       },
     }, this.data, this.body);
+    plot.over.addEventListener("pointerdown", () => { dragged = plot; });
+    return plot;
   }
 
   selected(plot) {
     if (plot.select.width < 6) return;
+    if (dragged !== plot) { // the others follow by the time, not by the place
+      plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+      return;
+    }
     const from = plot.posToVal(plot.select.left, "x");
     const to = plot.posToVal(plot.select.left + plot.select.width, "x");
     plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);

@@ -46,27 +46,17 @@ async function choose(doc, run, bin, low, high) {
   const error = displayOf(doc.channels[view.channel].unit);
   view.chart = {
     title: `Error of ${doc.channels[view.channel].title}`, unit: error.unit, height: 150,
-    series: [{ title: "behind this place", ...gaps(answer.samples), factor: error.factor, colour: "curve-2", width: 2 }],
+    series: [{ title: "behind this place", ...inOrder(answer.samples), factor: error.factor, colour: "curve-2", points: true }],
     lines: [{ value: 0, title: "", colour: "soft" }],
   };
   changed();
 }
 
-/** Samples of one record after the other; a gap where they do not follow each other. */
-function gaps({ time, error }) {
+/** Samples in the order of their time, each time once. */
+function inOrder({ time, error }) {
   const order = time.map((_, k) => k).sort((a, b) => time[a] - time[b]);
-  const step = Math.max(0.02, (time[order[order.length - 1]] - time[order[0]]) / 400);
-  const result = { time: [], value: [] };
-  order.forEach((k, place) => {
-    if (place && time[k] - time[order[place - 1]] > step) {
-      result.time.push(time[order[place - 1]] + step / 2);
-      result.value.push(null);
-    }
-    if (result.time[result.time.length - 1] === time[k]) return;
-    result.time.push(time[k]);
-    result.value.push(error[k]);
-  });
-  return result;
+  const kept = order.filter((k, place) => place === 0 || time[k] !== time[order[place - 1]]);
+  return { time: kept.map((k) => time[k]), value: kept.map((k) => error[k]) };
 }
 
 function behind() {

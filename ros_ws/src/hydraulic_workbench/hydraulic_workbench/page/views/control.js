@@ -18,6 +18,7 @@ async function load() {
     state.asksForControllers = true;
     const controllers = await attempt(() => get("/api/controllers"));
     if (controllers) update({ controllers });
+    else setTimeout(() => update({ asksForControllers: false }), 3000);
   }
   const { phase, law } = state.bench.controller ?? {};
   if (phase === "running" && asked !== law) {

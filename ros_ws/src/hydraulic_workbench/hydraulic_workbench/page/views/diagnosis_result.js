@@ -15,7 +15,7 @@ const asked = new Set();
 /** Candidates as they were found: of the event, of the job, or of the document. */
 function rows(job, doc) {
   const live = state.candidates[job.id];
-  if (live) return live;
+  if (live) return doc ? judged(live, doc) : live;
   if (!asked.has(job.id)) {
     asked.add(job.id);
     get(`/api/jobs/${encodeURIComponent(job.id)}`).then((answer) => {
@@ -24,6 +24,17 @@ function rows(job, doc) {
     }, () => {});
   }
   return doc ? rowsOf(doc) : [];
+}
+
+/** Rows of the search with what the verdict's refits, which go to the end, came to. */
+function judged(live, doc) {
+  const final = new Map(rowsOf(doc).map((one, place) => [one.name, { ...one, place }]));
+  const merged = live.map((row) => {
+    const end = final.get(row.name);
+    return end && end.stage !== "scored" ? { ...row, stage: end.stage, residual_before: end.residual_before, residual_after: end.residual_after } : row;
+  });
+  const rank = (row) => final.get(row.name)?.place ?? Infinity;
+  return merged.sort((a, b) => rank(a) - rank(b));
 }
 
 export function runningCandidates(job) {

@@ -16,6 +16,7 @@ async function load() {
   state.asksForChoices = true;
   const choices = await attempt(() => get("/api/plants"));
   if (choices) update({ choices });
+  else setTimeout(() => update({ asksForChoices: false }), 3000);
 }
 
 async function start(request) {

@@ -13,6 +13,7 @@ const go = (step) => attempt(() => post("/api/timeline/go", { index: step.index 
 /** Let a model run beside the plant. */
 export async function besidePlant(model) {
   if (await attempt(() => post("/api/live_model", { model }))) {
+    if (location.hash.includes("live")) return;
     say("It runs beside the plant: watch the residual.", "good", { text: "Live", run: () => open("live") });
   }
 }
