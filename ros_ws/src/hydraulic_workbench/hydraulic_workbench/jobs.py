@@ -190,6 +190,6 @@ class Jobs:
         self._hub.tell("job", job=job.document())
 
     def _note(self, job: Job) -> None:
-        kept = ("id", "verb", "title", "line", "model", "records", "plan", "phase", "error", "exit_code", "created", "seconds",
-                "residual", "candidates")  # fmt: skip
+        kept = ("id", "verb", "title", "line", "model", "records", "plan", "phase", "error", "exit_code", "created",
+                "seconds", "residual", "candidates")  # fmt: skip
         write_text(job.folder / NOTE, json.dumps({key: getattr(job, key) for key in kept}) + "\n")
