@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from conftest import Process
 from workbench.page.steps import PATIENCE_MS, until
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-PATIENCE_MS = 40_000
+PATIENCE_MS = 150_000
 
 
 def until(page: Any, condition: str, argument: Any = None) -> Any:

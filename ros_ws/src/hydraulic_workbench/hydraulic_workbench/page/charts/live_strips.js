@@ -207,7 +207,7 @@ export class LiveStrips extends HTMLElement {
   /** What stands at the cursors: rows of {column, a, b}. */
   readings() {
     const ring = this.frozen ?? live.ring;
-    const columns = this.panels.flatMap((panel) => panel.spec.columns).filter((column) => !this.muted.has(column.key));
+    const columns = this.panels.flatMap((panel) => panel.spec.columns).filter(({ key }) => this.present.has(key) && !this.muted.has(key));
     return [...new Set(columns)].map((column) => ({
       column,
       a: this.marks.A === null ? NaN : ring.at(column.key, this.marks.A),

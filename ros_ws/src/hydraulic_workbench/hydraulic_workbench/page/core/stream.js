@@ -5,6 +5,7 @@ const KEPT = 120000; // samples of each channel: two minutes at 1 kHz
 
 export const live = {
   epoch: null,
+  base: 0, // plant time of 0 on the axis [s]
   columns: [],
   ring: new SampleRing([], 1),
   frames: 0,
@@ -25,6 +26,7 @@ export function onEpoch(listener) {
 /** Another epoch: what was kept belongs to another time. */
 export function begin(event) {
   live.epoch = event.epoch;
+  live.base = event.base;
   live.columns = event.columns;
   live.ring = new SampleRing(event.columns.map((column) => column.key), KEPT);
   for (const listener of starts) listener();

@@ -12,7 +12,7 @@ function stopped() {
     ? ` Acknowledged after ${fixed(state.stop.milliseconds, 0)} ms.` : "";
   return html`<div class="banner stop" role="alert">
     <span><strong>Emergency stop.</strong> The drive is at 0 V and stays there.${took}
-      ${now.stop_reason ? html`<span class="soft">${now.stop_reason}</span>` : nothing}</span>
+      ${now.stop_reason && now.stop_reason !== "emergency stop" ? html`<span class="soft">${now.stop_reason}</span>` : nothing}</span>
     <button id="reset" ?disabled=${!operates() || now.may_reset === false} @click=${reset}>Reset…</button>
   </div>`;
 }

@@ -125,7 +125,7 @@ export function control() {
   if (!state.controllers) return nothing;
   const running = state.bench.controller?.phase === "running";
   return html`<section class="card" aria-label="Controller"><header><h2>Controller</h2>
-      ${running ? html`<span class="chip good"><i class="dot"></i>${state.bench.controller.active ? "active" : "waiting"}</span>` : nothing}</header>
+      ${running ? html`<span class="chip good"><i class="dot"></i>running</span>` : nothing}</header>
     <div class="stack tight">${law()}</div>
     ${running ? html`<hr><div class="stack tight">${reference()}</div>` : nothing}
   </section>`;

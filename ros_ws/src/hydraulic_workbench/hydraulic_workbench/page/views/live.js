@@ -55,7 +55,7 @@ function cursors() {
   const { A, B } = strips.marks;
   return html`<section class="card"><header><h2>Cursors</h2>
       <button class="small quiet" @click=${() => strips.follow()}>Clear</button></header>
-    <div class="scroll"><table><thead><tr><th>Channel</th><th class="number">A</th><th class="number">B</th><th class="number">B − A</th></tr></thead>
+    <div class="scroll"><table class="cursors"><thead><tr><th>Channel</th><th class="number">A</th><th class="number">B</th><th class="number">B − A</th></tr></thead>
       <tbody><tr><th>time [s]</th><td class="number">${digits(A, 5)}</td><td class="number">${B === null ? "–" : digits(B, 5)}</td>
         <td class="number">${B === null ? "–" : digits(B - A, 4)}</td></tr>
       ${strips.readings().map(({ column: one, a, b }) => html`<tr><th>${one.title} [${one.display.unit}]</th>

@@ -44,6 +44,9 @@ async function startReal(bus) {
   if (agreed) start({ kind: "can", bus: bus.name, interface: bus.interface, channel: bus.channel });
 }
 
+/** The current model where a plant can be made of it. */
+const usual = (models) => (models.find((model) => model.id === state.bench.current_model?.id) ?? models[0])?.id;
+
 const stopPlant = () => attempt(() => post("/api/plant/stop"));
 
 function modelField(models, value, pick) {
@@ -63,7 +66,7 @@ function guessCard(first) {
 
 function simulatorCard(choices) {
   const { models, effects } = choices.simulator;
-  chosen.model ??= models[0]?.id;
+  chosen.model ??= usual(models);
   const count = Object.keys(chosen.hidden).length;
   return html`<section class="card choice">
     <h2>Simulator</h2>
@@ -80,7 +83,7 @@ function simulatorCard(choices) {
 function virtualCard({ buses: all, models }) {
   const buses = all.map((bus) => bus.name ?? bus);
   chosen.bus ??= buses[0];
-  chosen.canModel ??= models[0]?.id;
+  chosen.canModel ??= usual(models);
   return html`<section class="card choice">
     <h2>Virtual CAN bench</h2>
     <p>The driver of the real bench against simulated devices on a CAN bus, with faults on buttons.</p>
