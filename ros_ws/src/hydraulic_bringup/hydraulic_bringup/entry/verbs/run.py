@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
 
 from .. import ros
 from ..bench import Bench
@@ -21,14 +20,6 @@ def run(bench: Bench, arguments: list[str]) -> int:
         return 0
     bench.prepare()
     variables = bench.variables()
-    return bench.replace_process(command(bench, arguments, variables), variables)
-
-
-def command(bench: Bench, arguments: list[str], variables: Mapping[str, str]) -> list[str]:
-    """The command line of an executable of the built workspace: PKG EXE [ARG …].
-
-    :raises UsageError: there is no such executable
-    """
     prefixes = ros.prefixes(variables)
     if len(arguments) < 2:
         own = {
@@ -39,5 +30,5 @@ def command(bench: Bench, arguments: list[str], variables: Mapping[str, str]) ->
     package, executable, *rest = arguments
     path = find(prefixes, package, executable)
     if shutil.which("ros2", path=variables["PATH"]):
-        return ["ros2", "run", package, executable, *rest]
-    return [str(path), *rest]
+        return bench.replace_process(["ros2", "run", package, executable, *rest], variables)
+    return bench.replace_process([str(path), *rest], variables)
