@@ -58,9 +58,6 @@ class AnsweringGraph:
     async def set_parameters(self, node: str, values: dict[str, Any], patience: float = 5.0) -> Said:
         return Said(True, "")
 
-    def publishers(self, topic: str) -> int:
-        return 1
-
 
 class Streams:
     """Streams that are well."""

@@ -13,6 +13,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.display import SHOWN
 from hydraulic_workbench.board import Board
 from hydraulic_workbench.calls import Graph
+from hydraulic_workbench.columns import COLUMNS
 from hydraulic_workbench.diagnostics import HealthBoard, Row, number
 from hydraulic_workbench.errors import NotNowError
 from hydraulic_workbench.experiments import Experiments
@@ -33,6 +34,7 @@ from hydraulic_workbench.uploads import Uploads
 from hydraulic_workbench.verbs_of_jobs import VERBS, Asked
 from hydraulic_workbench.workers import Workers
 
+POSITION = next(place for place, column in enumerate(COLUMNS) if column.key == "position")
 HIDDEN_OF_A_GUESS = ("effects", "extra_effects")
 _WATCH_S = 0.2
 _HEALTH_EVERY = 3
@@ -54,7 +56,7 @@ class Bench:
     def __init__(
         self, settings: Settings, graph: Graph, ring: SampleRing, intake: Intake, env: Mapping[str, str]
     ) -> None:
-        self.settings, self.graph, self._intake = settings, graph, intake
+        self.settings, self.graph, self._ring, self._intake = settings, graph, ring, intake
         self.folder = Folder(settings.folder)
         self.workers = Workers()
         self.hub = Hub(ring)
@@ -138,6 +140,8 @@ class Bench:
 
     def run_verb(self, verb: str, asked: Mapping[str, Any]) -> Job:
         """Have a verb run on what a page names by identifiers."""
+        if verb == "rehearse" and (position := self.plant_position()) is not None:
+            asked = {"position": position, **asked}
         model = self.model(asked.get("model"))
         records = [self.library.records[i].usable() for i in _list(asked.get("records"))]
         holdout = [self.library.records[i].usable() for i in _list(asked.get("holdout"))]
@@ -155,6 +159,10 @@ class Bench:
         of = f" on {', '.join(r.name for r in records)}" if records else ""
         title = f"{verb.replace('_', ' ')}{' ' if what else ''}{what}{of}"
         return self.jobs.start(verb, title, wanted, model.id, [r.id for r in records], plan.id if plan else None)
+
+    def plant_position(self) -> float | None:
+        """Where the piston stands [m]; None where no plant runs."""
+        return self._ring.newest(POSITION) if self.plant.running else None
 
     async def _job_finished(self, job: Job) -> None:
         for file in sorted(job.folder.glob("*.yaml")):

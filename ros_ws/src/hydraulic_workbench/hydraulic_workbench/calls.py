@@ -57,6 +57,3 @@ class Graph(Protocol):
 
     async def set_parameters(self, node: str, values: dict[str, Any], patience: float = 5.0) -> Said:
         """Set parameters of a node, all or none."""
-
-    def publishers(self, topic: str) -> int:
-        """How many publish a topic."""

@@ -23,6 +23,7 @@ from hydraulic_workbench.processes import Processes
 LISTENERS = 3  # to commands, before the excitation begins: plant, recorder, and this server
 START_S = 60.0
 SILENCE_S = 10.0  # of a plant in lockstep, until the excitation aborts
+SAME_PLACE_M = 0.02
 _LOOK_S = 0.1
 
 Recorded = Callable[[Path, Entry, str], Awaitable[str]]
@@ -49,19 +50,19 @@ class Experiments:
         """Whether one is on."""
         return self._task is not None and not self._task.done()
 
-    def start(self, plan: Entry, rehearsal: Job, name: str) -> None:
-        """Play a plan whose rehearsal has passed, and record it.
+    def start(self, plan: Entry, rehearsal: Job, name: str, position: float | None) -> None:
+        """Play a plan whose rehearsal has passed, and record it. ``position`` [m]: where the piston stands now.
 
         :raises NotNowError: something is in the way; the text says what.
         """
-        self._check(plan, rehearsal)
+        self._check(plan, rehearsal, position)
         bag = self._folder.new(self._folder.records, name)
         self._aborting, self.recorder_status, self.event = False, {}, {}
         self._put(phase="starting", plan=plan.id, plan_name=plan.name, record=None, progress=0.0, text="starting …",
                   seconds_left=plan.found["seconds"], bag=bag.name)  # fmt: skip
         self._task = asyncio.create_task(self._play(plan, bag))
 
-    def _check(self, plan: Entry, rehearsal: Job) -> None:
+    def _check(self, plan: Entry, rehearsal: Job, position: float | None) -> None:
         if self.busy:
             raise NotNowError("an experiment is on; abort it first")
         passed = rehearsal.verb == "rehearse" and rehearsal.phase == "finished" and rehearsal.exit_code == 0
@@ -71,6 +72,10 @@ class Experiments:
             )
         if rehearsal.line[1] != str(plan.file) or _changed(plan.file) > rehearsal.created:
             raise NotNowError("the plan is another one than was rehearsed: rehearse it again", "rehearsal")
+        began = rehearsed_from(rehearsal, float(plan.found["centre"]))
+        if position is not None and not plan.found["approach"] and abs(position - began) > SAME_PLACE_M:
+            where = f"at {1e3 * position:.0f} mm, and the rehearsal began at {1e3 * began:.0f} mm"
+            raise NotNowError(f"the piston stands {where}: rehearse the plan again", "rehearsal")
         now = self._board["plant"]
         if now["phase"] != "running":
             raise NotNowError("no plant runs")
@@ -168,6 +173,12 @@ class Experiments:
 
     def _put(self, **values: Any) -> None:
         self._board.change("experiment", **values)
+
+
+def rehearsed_from(rehearsal: Job, centre: float) -> float:
+    """Where a rehearsal began [m]."""
+    line = rehearsal.line
+    return float(line[line.index("--position") + 1]) if "--position" in line else centre
 
 
 def _changed(file: Path) -> float:

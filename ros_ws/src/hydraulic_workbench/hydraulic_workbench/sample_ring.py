@@ -47,11 +47,6 @@ class SampleRing:
         self._reached: dict[int, int] = {}  # first column of a topic → stamp up to which it has come
         self._early: dict[int, tuple[Sequence[int], Stamps, Values]] = {}
 
-    def clear(self) -> None:
-        """Begin a new epoch with the next row."""
-        with self._lock:
-            self._begin(0)
-
     def append(self, columns: Sequence[int], stamps: Stamps, values: Values) -> None:
         """Rows of the state: stamps ``(N,)``, values ``(len(columns), N)``. What goes back begins a new epoch."""
         if not stamps.size:
@@ -116,6 +111,12 @@ class SampleRing:
         """Stamp of the newest row; 0 where there is none."""
         with self._lock:
             return int(self._stamps[self._count - 1]) if self._count else 0
+
+    def newest(self, column: int) -> float | None:
+        """Value of a column in the newest row; None where there is none."""
+        with self._lock:
+            value = float(self._values[column, self._count - 1]) if self._count else float("nan")
+        return value if value == value else None
 
     def rows(self, first: int, end: int) -> Rows:
         """Rows ``first`` … ``end`` of this epoch, as far as they are still kept."""

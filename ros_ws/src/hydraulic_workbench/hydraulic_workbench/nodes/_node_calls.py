@@ -33,10 +33,6 @@ class NodeCalls:
         for name in ("emergency_stop", "reset"):  # made ahead: a stop must find its service at once
             self._client(_TRIGGER, name)
 
-    def publishers(self, topic: str) -> int:
-        """See `calls.Graph`."""
-        return int(self._link.node.count_publishers(absolute(topic, self.namespace)))
-
     async def trigger(self, name: str, patience: float = 5.0) -> Said:
         """See `calls.Graph`."""
         answer = await self._call(_TRIGGER, name, patience)

@@ -23,6 +23,7 @@ def describe(file: Path) -> dict[str, Any]:
             "amplitude_limit": plan.amplitude_limit,
             "travel_limit": plan.travel_limit,
             "centre": plan.centre,
+            "approach": plan.approach,
             "rate": plan.rate,
         }
     )

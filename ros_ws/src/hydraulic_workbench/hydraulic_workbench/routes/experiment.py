@@ -33,7 +33,8 @@ def routes(bench: Bench) -> list[web.AbstractRouteDef]:
         wanted = await asked(request)
         plan = shelf[wanted.get("plan")].usable()
         name = checked_name(wanted["name"], "name") if wanted.get("name") else plan.name
-        bench.experiments.start(plan, bench.jobs[str(wanted.get("rehearsal"))], name)
+        rehearsal = bench.jobs[str(wanted.get("rehearsal"))]
+        bench.experiments.start(plan, rehearsal, name, bench.plant_position())
         return answer(status=202)
 
     async def abort(_: web.Request) -> web.Response:
