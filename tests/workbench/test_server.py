@@ -7,6 +7,7 @@ import json
 import os
 import sys
 from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from hydraulic_workbench.columns import COLUMNS
 from hydraulic_workbench.diagnostics import Row
 from hydraulic_workbench.sample_ring import SampleRing
 from hydraulic_workbench.server import Server, listen
+from hydraulic_workbench.workers import Workers
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS = ROOT / "examples" / "sample_bench" / "steps.csv.gz"
@@ -88,10 +90,12 @@ class Rig:
 
 
 @asynccontextmanager
-async def rig(folder: Path, read_only: bool = False, **settings: Any) -> Any:
+async def rig(folder: Path, read_only: bool = False, processes: bool = False, **settings: Any) -> Any:
+    """A server; files are read in a thread unless the ``processes`` are wanted that take a second to start."""
     sock, ring, graph = listen(0), SampleRing(5000, len(COLUMNS), 200 * MS), AnsweringGraph()
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    bench = Bench(Settings(folder, **settings), graph, ring, Streams(), env)
+    workers = None if processes else Workers(lambda: ThreadPoolExecutor(1))
+    bench = Bench(Settings(folder, **settings), graph, ring, Streams(), env, workers)
     server = Server(bench, Access(sock.getsockname()[1], read_only), sock)
     await server.begin()
     await bench.begin()
@@ -352,7 +356,7 @@ def test_uploads_take_no_place_outside(tmp_path: Path) -> None:
 
 def test_a_comparison_from_the_click_to_the_samples_behind_its_map(tmp_path: Path) -> None:
     async def test() -> None:
-        async with rig(tmp_path) as bench, bench.client() as client:
+        async with rig(tmp_path, processes=True) as bench, bench.client() as client:
             upload = (await json_of(client.post("/api/uploads", json={"name": STEPS.name})))["upload"]
             await json_of(client.put(f"/api/uploads/{upload}/file/{STEPS.name}", data=STEPS.read_bytes()))
             record = (await json_of(client.post(f"/api/uploads/{upload}/finish", json={})))["record"]["id"]

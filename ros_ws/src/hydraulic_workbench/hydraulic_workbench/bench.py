@@ -54,11 +54,12 @@ class Bench:
     """Made in the loop's thread, over the graph; `begin` and `end` frame its life."""
 
     def __init__(
-        self, settings: Settings, graph: Graph, ring: SampleRing, intake: Intake, env: Mapping[str, str]
-    ) -> None:
+        self, settings: Settings, graph: Graph, ring: SampleRing, intake: Intake, env: Mapping[str, str],
+        workers: Workers | None = None,
+    ) -> None:  # fmt: skip
         self.settings, self.graph, self._ring, self._intake = settings, graph, ring, intake
         self.folder = Folder(settings.folder)
-        self.workers = Workers()
+        self.workers = workers or Workers()
         self.hub = Hub(ring)
         self.board = Board(self.hub)
         self.health = HealthBoard()

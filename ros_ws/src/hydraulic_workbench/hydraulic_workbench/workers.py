@@ -10,7 +10,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from typing import Any, TypeVar, cast
 
 from hydraulic_bringup.demo.processes import end_with_parent
@@ -37,11 +37,16 @@ def _guarded(function: Callable[..., T], *arguments: Any) -> tuple[T | None, str
         return None, one_line(error), None
 
 
-class Workers:
-    """Runs functions of this package in a process of their own, which is started again where it has died."""
+def _one_process() -> Executor:
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin)
 
-    def __init__(self) -> None:
-        self._pool: ProcessPoolExecutor | None = None
+
+class Workers:
+    """Runs functions of this package as ``make`` says: in a process of their own, started again where it has died."""
+
+    def __init__(self, make: Callable[[], Executor] = _one_process) -> None:
+        self._make = make
+        self._pool: Executor | None = None
 
     async def run(self, function: Callable[..., T], *arguments: Any) -> T:
         """What the function returns.
@@ -49,8 +54,7 @@ class Workers:
         :raises WorkbenchError: it refused its arguments, or the process died at it.
         """
         if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, context, _begin)
+            self._pool = self._make()
         try:
             loop = asyncio.get_running_loop()
             result, problem, field = await loop.run_in_executor(self._pool, _guarded, function, *arguments)
