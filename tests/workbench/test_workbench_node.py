@@ -6,6 +6,9 @@ import asyncio
 import os
 import re
 import signal
+import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -143,6 +146,38 @@ def test_whatever_becomes_of_page_and_server_the_plant_is_safe(bench: Any, clien
     time.sleep(0.5)
     assert len(states) > at_rest and all(s.effort[1] == 0.0 for s in states[at_rest:]), "the plant goes on, at 0 V"
     assert plant.popen.poll() is None
+
+
+@pytest.mark.timing
+def test_the_stop_button_gives_0_v_within_50_ms(bench: Any, client: Any, wait_until: Any) -> None:
+    """From the press to the stamp of the first state with 0 V, while another program keeps a core busy."""
+    _, server = bench
+    states, source = client.collect("state"), client.source("tester", 1.0)
+    busy = subprocess.Popen([sys.executable, "-c", "while True: sum(range(1000))"])
+
+    async def press() -> list[float]:
+        found = []
+        async with Page(server.output()) as page:
+            await page.until(lambda: page.state.get("plant", {}).get("may_enable"), "the plant")
+            for _ in range(11):
+                await page.post("plant/reset")
+                assert (await page.post("plant/enable", on=True))["ok"]
+                await page.until(lambda: states[-1].effort[1] != 0.0, "a drive")
+                number, pressed = len(states), time.time_ns()
+                assert (await page.stop())["ok"]
+                await page.until(lambda: states[-1].effort[1] == 0.0, "0 V", 5.0)
+                first = next(s for s in states[number:] if s.effort[1] == 0.0)
+                found.append((first.header.stamp.sec * 10**9 + first.header.stamp.nanosec - pressed) * 1e-6)
+        return found
+
+    try:
+        found = asyncio.run(asyncio.wait_for(press(), 200.0))
+    finally:
+        busy.kill()
+        busy.wait()
+        source.stop()
+    print("stop to 0 V [ms]:", sorted(round(one, 1) for one in found))
+    assert statistics.median(found) <= 50.0
 
 
 def children_of(pid: int) -> list[int]:

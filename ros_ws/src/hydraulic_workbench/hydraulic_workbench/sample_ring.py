@@ -35,8 +35,9 @@ class SampleRing:
         self._capacity, self._columns, self._longest_wait_ns = capacity, columns, longest_wait_ns
         self._lock = threading.Lock()
         # Twice the room: the last half moves to the front when the end is reached, so that rows lie side by side.
-        self._stamps: Stamps = np.empty(2 * capacity, np.int64)
-        self._values: Values = np.empty((columns, 2 * capacity), np.float32)
+        # Written to at once: the memory of an empty array is only taken as it fills, over minutes.
+        self._stamps: Stamps = np.full(2 * capacity, -1, np.int64)
+        self._values: Values = np.full((columns, 2 * capacity), np.nan, np.float32)
         self.epoch, self.base_ns, self.unmatched = 0, 0, 0
         self._begin(0)
 
