@@ -16,6 +16,7 @@ import aiohttp
 import numpy as np
 import pytest
 
+from hydraulic_sim.model_file import presets
 from hydraulic_workbench.access import Access
 from hydraulic_workbench.bench import Bench, Settings
 from hydraulic_workbench.calls import NoAnswerError, NodeParameter, Said
@@ -386,6 +387,41 @@ def test_a_comparison_from_the_click_to_the_samples_behind_its_map(tmp_path: Pat
             items = f"record:{record},model:mod-sample_bench@record:{record}"
             series = (await json_of(client.get(f"/api/overlay?items={items}&channels=position")))["series"]
             assert [set(s["channels"]) for s in series] == [{"position"}] * 2
+
+    run(test)
+
+
+def test_the_model_of_an_opened_diagnosis_is_applied_and_undone(tmp_path: Path) -> None:
+    folder = tmp_path / "demo"
+    folder.mkdir()
+    residual = {"before": {"validation": 3.0}, "after": {"validation": 1.0}, "after_each_effect": [{"name": "leak"}]}
+    document = {
+        "schema": "hydraulic_sysid.diagnose/2",
+        "created": "2026",
+        "verdict": {"text": "so"},
+        "residual": residual,
+    }
+    (folder / "diagnose.json").write_text(json.dumps(document))
+    (folder / "other.json").write_text("[1, 2]")
+    (folder / "report.html").write_text("<!-- hydraulic_sysid report -->")
+    (folder / "model.yaml").write_text(presets()["sample_bench"].read_text())
+
+    async def test() -> None:
+        async with rig(tmp_path / "out", open=[folder]) as bench, bench.client() as client:
+            (run_found,) = (await json_of(client.get("/api/runs")))["runs"]
+            assert (run_found["verb"], run_found["verdict"]) == ("diagnose", "so")
+            before = (await json_of(client.get("/api/models")))["current"]
+            applied = (await json_of(client.post(f"/api/runs/{run_found['id']}/apply", json={})))["current"]
+            step = (await json_of(client.get("/api/timeline")))["steps"][-1]
+            assert applied != before and step["model"] == applied and step["file"] == str(folder / "model.yaml")
+            assert (step["what"], step["effect"], step["error_before"], step["error_after"]) == (
+                "applied",
+                "leak",
+                3.0,
+                1.0,
+            )
+            assert (await json_of(client.post("/api/timeline/undo", json={})))["current"] == before
+            await json_of(client.post("/api/runs/none/apply", json={}), 404)
 
     run(test)
 

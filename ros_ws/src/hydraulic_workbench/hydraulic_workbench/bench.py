@@ -27,7 +27,7 @@ from hydraulic_workbench.library import DEFAULT_MODEL, Entry, Library
 from hydraulic_workbench.plant import Plant
 from hydraulic_workbench.plant_kinds import GUESS, Chosen
 from hydraulic_workbench.processes import Processes
-from hydraulic_workbench.results import Results
+from hydraulic_workbench.results import Results, errors_of
 from hydraulic_workbench.sample_ring import SampleRing
 from hydraulic_workbench.timeline import Step, Timeline
 from hydraulic_workbench.uploads import Uploads
@@ -170,24 +170,25 @@ class Bench:
             if file.stem in ("model",) or file.stem.startswith("competing_"):
                 entry = await self.library.add_model(file, "run", run=job.id)
                 if file.stem == "model" and (what := VERBS[job.verb].leads_to_model):
-                    self._step(what, entry, job)
+                    self._step(what, entry, job.folder, job.id)
             elif job.verb in ("design", "next_experiment"):
                 source = "designed" if job.verb == "design" else "next_experiment"
                 await self.library.add_plan(file, source, run=job.id)
 
-    def _step(self, what: str, entry: Entry, job: Job) -> None:
-        before, after, effect = self.results.errors_of(job)
-        self.timeline.add(Step(what, str(entry.file), effect, before, after, job.id))
+    def _step(self, what: str, entry: Entry, folder: Path, run: str) -> None:
+        before, after, effect = errors_of(folder)
+        self.timeline.add(Step(what, str(entry.file), effect, before, after, run))
 
-    def apply(self, job: Job) -> None:
+    def apply(self, run: str) -> None:
         """Go on with the model that a diagnosis names.
 
         :raises NotNowError: it names none.
         """
-        entry = self.library.models.of_file(job.folder / "model.yaml")
+        folder = self.results.folder(run)
+        entry = self.library.models.of_file(folder / "model.yaml")
         if entry is None:
             raise NotNowError("this run names no model: see its verdict")
-        self._step("applied", entry, job)
+        self._step("applied", entry, folder, run)
 
     def _timeline_changed(self) -> None:
         self.folder.keep({"timeline": self.timeline.memory()})

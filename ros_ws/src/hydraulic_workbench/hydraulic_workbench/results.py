@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from hydraulic_sysid.data.results import PAGE
+from hydraulic_sysid.data.results import PAGE, read_folder
 from hydraulic_workbench.errors import UnknownError
 from hydraulic_workbench.folder import Folder
-from hydraulic_workbench.jobs import NOTE, Job, Jobs
+from hydraulic_workbench.jobs import Jobs
 from hydraulic_workbench.reading import results
 from hydraulic_workbench.workers import Workers
 
@@ -58,16 +57,14 @@ class Results:
         """A run's document, without what only plots need unless the whole is asked for."""
         return await self._workers.run(results.document, self.folder(identifier), whole)
 
-    def errors_of(self, job: Job) -> tuple[float | None, float | None, str | None]:
-        """Residual over noise on validation data before and after, and the effect that a run has added."""
-        found: dict[str, Any] = {}
-        for file in sorted(job.folder.glob("*.json")):
-            if file.name != NOTE:
-                found = json.loads(file.read_text("utf-8"))
-        residual = found.get("residual")
-        if not isinstance(residual, dict):
-            return None, None, None
-        effects = [row["name"] for row in residual.get("after_each_effect", [])]
-        sides = (residual.get(side, {}).get("validation") for side in ("before", "after"))
-        before, after = (None if value is None else float(value) for value in sides)
-        return before, after, " + ".join(effects) or None
+
+def errors_of(folder: Path) -> tuple[float | None, float | None, str | None]:
+    """Residual over noise on validation data before and after, and the effects that the last run in it has added."""
+    found = read_folder(folder)[-1]
+    residual = found.get("residual")
+    if not isinstance(residual, dict):
+        return None, None, None
+    effects = [row["name"] for row in residual.get("after_each_effect", [])]
+    sides = (residual.get(side, {}).get("validation") for side in ("before", "after"))
+    before, after = (None if value is None else float(value) for value in sides)
+    return before, after, " + ".join(effects) or None

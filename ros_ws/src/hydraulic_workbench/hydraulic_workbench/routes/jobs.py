@@ -68,7 +68,7 @@ def routes(bench: Bench) -> list[web.AbstractRouteDef]:
         return answer(await bench.workers.run(*work))
 
     async def apply(request: web.Request) -> web.Response:
-        bench.apply(bench.jobs[request.match_info["id"]])
+        bench.apply(request.match_info["id"])
         return answer({"current": bench.current_model.id})
 
     return [
