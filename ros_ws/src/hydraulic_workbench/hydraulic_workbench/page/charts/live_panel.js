@@ -6,7 +6,8 @@ import { digits } from "../core/format.js";
 
 const LEAST = { mm: 2, "mm/s": 20, V: 1, bar: 4, kN: 0.5, "%": 2 }; // height of an axis, in the unit shown
 
-const dashed = (key) => (key.startsWith("reference") || key === "command" ? [5, 4] : undefined);
+// A command may go up and down with every sample, and dashing a path that long takes a tenth of a second: it is thin.
+const dashed = (key) => (key.startsWith("reference") ? [5, 4] : undefined);
 
 export class LivePanel {
   /** `spec`: {title, columns, second} — with `second` the last column has an axis of its own, at the right. */
@@ -88,7 +89,7 @@ export class LivePanel {
     const series = this.spec.columns.map((column, k) => ({
       scale: this.spec.second && k === last ? "second" : "y",
       stroke: () => css(this.colour(column, k)),
-      width: 1.4,
+      width: column.key === "command" ? 0.5 : 1, // up to one pixel the browser draws a line several times faster
       dash: dashed(column.key),
       points: { show: false },
       show: !this.muted.has(column.key),
