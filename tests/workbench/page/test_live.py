@@ -50,7 +50,7 @@ def test_a_controller_is_tuned_live_and_taken_back(page: Any, picture: Callable[
     value = page.locator(".gains .slider b").first
     before = value.inner_text()
     slider.evaluate(
-        "e => { e.value = Number(e.min) + 0.7 * (e.max - e.min); e.dispatchEvent(new Event('input', {bubbles: true})); }"
+        "e => { e.value = Number(e.min) + 0.7 * (e.max - e.min); e.dispatchEvent(new Event('input', {bubbles: true})); }"  # noqa: E501
     )
     assert value.inner_text() != before
     page.click("#undo-gains:not([disabled])")
