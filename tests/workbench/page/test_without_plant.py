@@ -41,7 +41,8 @@ def table(header: str, time_factor: float = 1000.0) -> bytes:
 def test_the_first_paint_takes_less_than_a_second(bench: Any) -> None:
     page = bench.open()
     paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
-    bytes_ = page.evaluate("""performance.getEntriesByType('resource').concat(performance.getEntriesByType('navigation'))  # noqa: E501
+    bytes_ = page.evaluate("""performance.getEntriesByType('resource')
+        .concat(performance.getEntriesByType('navigation'))
         .filter(({name}) => !name.includes('plotly')).reduce((sum, one) => sum + one.decodedBodySize, 0)""")
     print(f"first paint after {paint:.0f} ms, {bytes_ / 1e3:.0f} kB")
     assert paint < FIRST_PAINT_MS
