@@ -26,6 +26,7 @@ BELOW: dict[str, set[str]] = {
     "hydraulic_can_driver": {*GROUND, "hydraulic_plant_node"},
 }
 BELOW["hydraulic_bringup"] = set(BELOW)
+BELOW["hydraulic_workbench"] = set(BELOW)
 
 # The wings of hydraulic_sysid and those below each. The report shows result documents and knows nothing else.
 WINGS_BELOW: dict[str, set[str]] = {

@@ -158,7 +158,7 @@ def test_help_of_a_verb_sets_nothing_up(tmp_path: Path, verb: str) -> None:
 def test_unknown_verb_is_named_with_those_there_are(checkout: FakeCheckout) -> None:
     answer = checkout.bench("dmeo")
     assert answer.returncode == 2
-    assert "'dmeo'" in answer.stderr and "demo, test, run" in answer.stderr
+    assert "'dmeo'" in answer.stderr and "demo, workbench, test" in answer.stderr
 
 
 def test_it_is_called_from_anywhere_and_through_a_link(built: FakeCheckout, tmp_path: Path) -> None:

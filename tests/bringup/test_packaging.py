@@ -49,6 +49,7 @@ def test_the_workspace_holds_the_packages() -> None:
         "hydraulic_plant_node",
         "hydraulic_sim",
         "hydraulic_sysid",
+        "hydraulic_workbench",
     ]
 
 
@@ -183,6 +184,7 @@ def test_manifest_declares_the_ros_packages_that_are_imported(name: str) -> None
 
 
 ROSDEP = {
+    "aiohttp": "python3-aiohttp",
     "can": "python3-can",
     "canopen": "canopen-pip",
     "control": "python-control-pip",

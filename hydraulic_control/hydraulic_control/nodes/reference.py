@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
 from hydraulic_control.errors import ControlError
-from hydraulic_control.nodes._reference_parameters import PARAMETERS
+from hydraulic_control.reference_parameters import PARAMETERS
 from hydraulic_control.reference_run import ReferenceRun, StandstillWatch
 from hydraulic_control.trajectories import MotionLimits
 from hydraulic_interfaces.contract import NAMESPACE, REFERENCE_NODE

@@ -47,11 +47,12 @@ class Figures:
     """The figures of a page: given a place each, and written once, to be drawn when they come into view."""
 
     known: dict[str, go.Figure] = field(default_factory=dict)
+    titles: dict[str, str] = field(default_factory=dict)
 
-    def add(self, figure: go.Figure) -> str:
+    def add(self, figure: go.Figure, title: str = "") -> str:
         """The name under which the page holds the figure."""
         name = f"figure-{len(self.known) + 1}"
-        self.known[name] = figure
+        self.known[name], self.titles[name] = figure, title
         return name
 
 
@@ -61,6 +62,20 @@ def render(results: Sequence[Result]) -> str:
     :raises ResultError: no result, one of a schema that this version cannot show, or one that lacks what its schema
         promises.
     """
+    return _render(results, Figures())
+
+
+def figures_of(result: Result) -> list[tuple[str, go.Figure]]:
+    """The figures that the page of a result shows, with their titles, in its order.
+
+    :raises ResultError: as `render`.
+    """
+    place = Figures()
+    _render([result], place)
+    return [(title, place.known[name]) for name, title in place.titles.items()]
+
+
+def _render(results: Sequence[Result], place: Figures) -> str:
     if not results:
         raise ResultError("there is no result to show")
     kinds, parts = _kinds(), []
@@ -72,7 +87,7 @@ def render(results: Sequence[Result]) -> str:
         parts.append({"result": result, "template": f"{folder}/section.html.j2", "figures": figures})
     page = _environment().get_template("page.html.j2")
     try:
-        text = page.render(parts=parts, place=Figures(), mark=Markup(PAGE_MARK), plotly=Markup(get_plotlyjs()))
+        text = page.render(parts=parts, place=place, mark=Markup(PAGE_MARK), plotly=Markup(get_plotlyjs()))
         text.encode()  # JSON can hold halves of characters
         return text
     except (TemplateRuntimeError, LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:

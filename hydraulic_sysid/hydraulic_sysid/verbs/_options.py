@@ -70,14 +70,18 @@ def run(
     parser.add_argument(
         "--json", action="store_true", help="print the result as JSON (without traces) instead of a table"
     )
+    parser.add_argument(
+        "--progress", action="store_true", help="print what is being done as lines of JSON, for other programs"
+    )
 
     def action(options: argparse.Namespace) -> int:
         give_back()
         folder: Path = options.out
         results.check_target(folder, verb)
         with Console(stderr=True).status(f"{verb} …") as status:
-            done = work(options, lambda text: status.update(f"{text} …"))
-            status.update("writing the report …")
+            say = tell_programs if options.progress else lambda text: status.update(f"{text} …")
+            done = work(options, say)
+            say("writing the report")
             results.write_result(folder, done.result)
             for name, write in done.files.items():
                 write(folder / name)
@@ -95,6 +99,17 @@ def run(
         return cli.OK if done.good else cli.NEGATIVE
 
     return cli.run(parser, action, argv)
+
+
+def tell_programs(text: str = "", **more: Any) -> None:
+    """A line of JSON on standard error: what is being done (``progress``), or ``more`` that a verb tells meanwhile."""
+    told = {"progress": text, **more} if text else more
+    print(json.dumps(results.plain(told), ensure_ascii=False, allow_nan=False), file=sys.stderr, flush=True)
+
+
+def watch(options: argparse.Namespace) -> Callable[[Mapping[str, Any]], None] | None:
+    """What takes the findings of a search while it goes on: for the programs that asked for them."""
+    return (lambda found: tell_programs(**found)) if options.progress else None
 
 
 def _without(value: Any, names: Sequence[str]) -> Any:

@@ -50,7 +50,7 @@ def _add(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     records = opt.read_records(options)
     validation = opt.read_kept_back(options.holdout, options)
     effect = options.effect if file is None else file.stem
-    done = add(model, effect, records, validation, FitSettings(length=options.segment), say)
+    done = add(model, effect, records, validation, FitSettings(length=options.segment), say, opt.watch(options))
     files: dict[str, Callable[[Path], object]] = {}
     if file is not None and copied:
         files[file.name] = partial(shutil.copyfile, file)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from hydraulic_sysid.data.display import first_upper, number, quantity
 from hydraulic_sysid.diagnosis.compare import ModelSubject, compare
 from hydraulic_sysid.diagnosis.compare.findings import AT_FLOOR
 from hydraulic_sysid.diagnosis.compare.fmu_subject import FmuSubject
+from hydraulic_sysid.diagnosis.compare.reference_run import Compared
+from hydraulic_sysid.diagnosis.compare.samples import write_samples
 from hydraulic_sysid.diagnosis.compare.subject import Subject
 from hydraulic_sysid.verbs import _options as opt
 
@@ -30,6 +33,7 @@ examples:
   python -m hydraulic_sysid compare --model my.yaml --record runs/bag --horizon 1 --out runs/bag-compared
   python -m hydraulic_sysid compare --fmu axis.fmu --variables drive=u position=rod.s --record runs/bag --out runs/fmu
 """
+SAMPLES = "samples.npz"
 _LISTED = 3  # findings on the terminal; all of them stand in the results
 
 
@@ -51,6 +55,7 @@ def main(argv: list[str] | None = None) -> int:
     )
     opt.add_record_options(parser)
     parser.add_argument("--horizon", metavar="SECONDS", type=float, default=0.5, help="how far ahead (default 0.5)")
+    parser.add_argument("--samples", action="store_true", help=f"keep every sample behind the error maps ({SAMPLES})")
     return opt.run(parser, _compare, _show, argv, bulky=("traces", "drive", "error_maps", "spectra", "error_growth"))
 
 
@@ -63,7 +68,10 @@ def _compare(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     else:
         subject = ModelSubject(load_model(options.model))
     records = opt.read_records(options)
-    return opt.Done(compare(subject, records, options.horizon, lambda name: say(f"comparing {name}")))
+    kept: list[Compared] = []
+    keep = kept.extend if options.samples else None
+    result = compare(subject, records, options.horizon, lambda name: say(f"comparing {name}"), keep)
+    return opt.Done(result, {SAMPLES: partial(write_samples, kept)} if kept else {})
 
 
 def _pair(text: str) -> tuple[str, str]:

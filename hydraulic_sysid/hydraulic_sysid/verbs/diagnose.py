@@ -63,7 +63,9 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
         _check_name(options.propose, model)
     records = opt.read_records(options)
     validation = opt.read_kept_back(options.holdout, options)
-    done = diagnose(model, records, validation, FitSettings(length=options.segment), say, options.within)
+    done = diagnose(
+        model, records, validation, FitSettings(length=options.segment), say, options.within, opt.watch(options)
+    )
     kind = done.result["verdict"]["kind"]
     models = {f"competing_{name}.yaml": model for name, model in done.competing.items()}
     notes = []

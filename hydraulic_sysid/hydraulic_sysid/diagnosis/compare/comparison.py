@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hydraulic_node_utils import processors
+from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.display import TITLES, number, percent
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import heading
@@ -27,6 +28,7 @@ from .subject import Subject
 Progress = Callable[[str], None]
 
 VARIABLES = {"velocity": "m/s", "drive": "V", "spool": "1", "load_pressure": "Pa", "position": "m", "time": "s"}
+DIRECTION = "direction"
 _STANDING = 3.0  # standard deviations of the velocity's noise below which a piston counts as standing
 HEADLINE = ("position", "load_pressure")
 """Channels whose fit stands in the verdict."""
@@ -36,12 +38,16 @@ _SECOND = 0.8  # a second variable is named if it explains at least this part of
 
 
 def compare(
-    subject: Subject, records: Sequence[Record], horizon: float = 0.5, progress: Progress | None = None
+    subject: Subject,
+    records: Sequence[Record],
+    horizon: float = 0.5,
+    progress: Progress | None = None,
+    keep: Callable[[Sequence[Compared]], None] | None = None,
 ) -> dict[str, Any]:
     """Result document of a model (`ModelSubject`) or another subject set against records; arrays are NumPy, SI.
 
     ``horizon``: seconds ahead of the finite-horizon prediction. ``progress`` is called with the name of each record as
-    its turn comes.
+    its turn comes, ``keep`` with all samples before they become figures (see `samples`).
 
     :raises ComparisonError: no record, or one that lacks what a comparison needs.
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run over a record.
@@ -51,6 +57,8 @@ def compare(
     for record in records:
         check(record, horizon)
     compared = _run_all(subject, records, horizon, progress)
+    if keep is not None:
+        keep(compared)
     channels = [name for name in UNITS if any(name in c.data.compared for c in compared)]
     maps = _maps(compared, channels)
     documents = [{**record_document(c), "error_maps": _plain_maps(_maps([c], c.data.compared))} for c in compared]
@@ -95,17 +103,12 @@ def _run_all(subject: Subject, records: Sequence[Record], horizon: float, progre
 def _maps(compared: Sequence[Compared], channels: Sequence[str]) -> dict[str, dict[str, ErrorMap]]:
     """Maps of every channel's horizon error over every variable that all records have, records pooled."""
     folds = folds_of([c.data.record.time for c in compared])
+    values = [variables_of(c) for c in compared]
     binnings = {}
-    for name in VARIABLES:
-        if name == "time":
-            values = [c.data.record.time - c.data.record.time[0] for c in compared]
-        elif all(name in c.data.channels for c in compared):
-            values = [c.data.channels[name] for c in compared]
-        else:
-            continue
-        binnings[name] = Binning.of(np.concatenate(values))
-    moving = [directions(c.data.channels["velocity"], _STANDING * c.data.noise["velocity"]) for c in compared]
-    binnings["direction"] = Binning.of(np.concatenate(moving), DIRECTION_EDGES)
+    for name in (*VARIABLES, DIRECTION):
+        if all(name in known for known in values):
+            edges = DIRECTION_EDGES if name == DIRECTION else None
+            binnings[name] = Binning.of(np.concatenate([known[name] for known in values]), edges)
     maps: dict[str, dict[str, ErrorMap]] = {}
     for channel in channels:
         errors = [
@@ -116,6 +119,13 @@ def _maps(compared: Sequence[Compared], channels: Sequence[str]) -> dict[str, di
         independent = independent_samples(error, folds)
         maps[channel] = {v: error_map(error, b, folds, independent) for v, b in binnings.items()}
     return maps
+
+
+def variables_of(c: Compared) -> dict[str, Array]:
+    """What the errors of a record are looked at over, each ``(N,)``."""
+    time, known = c.data.record.time, c.data.channels
+    found = {name: time - time[0] if name == "time" else known[name] for name in VARIABLES if name in (*known, "time")}
+    return {**found, DIRECTION: directions(known["velocity"], _STANDING * c.data.noise["velocity"])}
 
 
 def _plain_maps(maps: dict[str, dict[str, ErrorMap]]) -> dict[str, Any]:

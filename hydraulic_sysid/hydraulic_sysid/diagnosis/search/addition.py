@@ -15,6 +15,7 @@ from .diagnosis import finished
 from .document import added_document
 from .errors import DiagnosisError
 from .misfit import material
+from .progress import Watch
 from .search import Search
 from .uncertainty import parameter_errors
 
@@ -35,6 +36,7 @@ def add(
     validation: Sequence[Record] = (),
     settings: FitSettings | None = None,
     progress: Callable[[str], None] | None = None,
+    watch: Watch | None = None,
 ) -> Addition:
     """Switch ``effect`` on, fit it with all that is free, and say what it does to the error on validation data.
 
@@ -44,7 +46,8 @@ def add(
     if effect in model.effects:
         raise DiagnosisError(f"{effect} is on already; calibrate fits its parameters")
     model.with_effect(effect).check_complete()
-    found = Search.of(model, records, validation, settings or FitSettings(), progress or (lambda _: None)).add(effect)
+    say = progress or (lambda _: None)
+    found = Search.of(model, records, validation, settings or FitSettings(), say, watch=watch).add(effect)
     confirmed = material(found.base.misfit, found.final.misfit)
     known = parameter_errors(found.final.linearisation)
     return Addition(as_filed(finished(found, known), model), confirmed, added_document(found, known, confirmed))

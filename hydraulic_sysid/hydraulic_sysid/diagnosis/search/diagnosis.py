@@ -22,6 +22,7 @@ from .document import document, with_balances
 from .linearisation import Linearisation
 from .misfit import explained
 from .nonparametric_curves import NonparametricCurve, nonparametric_curves
+from .progress import Watch
 from .search import Search
 from .search_state import SearchResult
 from .uncertainty import Known, parameter_errors
@@ -79,19 +80,21 @@ def diagnose(
     settings: FitSettings | None = None,
     progress: Callable[[str], None] | None = None,
     within: float | None = None,
+    watch: Watch | None = None,
 ) -> Diagnosis:
     """Find the library effects that ``model`` lacks to explain ``records``.
 
     Parameters are fitted to ``records``; an effect counts only if it lowers the error on ``validation`` too (default:
     every third block of every record). Records need drive and position; pressures distinguish more. After ``within``
-    seconds, or when the user ends it (KeyboardInterrupt), the best so far is the answer, marked as such.
+    seconds, or when the user ends it (KeyboardInterrupt), the best so far is the answer, marked as such. ``watch``
+    takes what is found meanwhile: the residual whenever it is lower, and the table of candidates.
 
     :raises DiagnosisError: no records, or unusable ones.
     :raises hydraulic_sim.errors.ModelError: a model that does not compose.
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
     say = progress or (lambda _: None)
-    search = Search.of(model, records, validation, settings or FitSettings(), say, within)
+    search = Search.of(model, records, validation, settings or FitSettings(), say, within, watch)
     say("the records against the model file")
     checked = contradictions(model, [*records, *validation])
     found = verdicts.conclusive(search.run())

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from .errors import DiagnosisError
 from .misfit import Misfit
@@ -17,12 +18,17 @@ class OutOfTimeError(DiagnosisError):
     """The time that a search was given is over."""
 
 
+Watch = Callable[[Mapping[str, Any]], None]
+"""Takes what has been found so far: ``residual`` over noise on validation data, or the table of ``candidates``."""
+
+
 @dataclass
 class Progress:
-    """Tells ``say``; ``within`` seconds of its beginning it ends the search."""
+    """Tells ``say``, and ``watch`` what is found; ``within`` seconds of its beginning it ends the search."""
 
     say: Callable[[str], None]
     within: float | None = None
+    watch: Watch = field(default=lambda _: None)
     begun: float = field(default_factory=time.monotonic)
     first: Misfit | None = None
     lowest: Misfit | None = None
@@ -59,3 +65,4 @@ class Progress:
         self.first = self.first or misfit
         if self.lowest is None or misfit.total < self.lowest.total:
             self.lowest, self.effects = misfit, tuple(effects)
+            self.watch({"residual": misfit.rms_validation, "effects": list(effects)})

@@ -24,6 +24,7 @@ from hydraulic_sysid.estimation.parameters import Parameters, bounded
 from hydraulic_sysid.estimation.refinement import outlying, refined, usable
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
+from .candidate_table import candidate_table
 from .candidates import candidates, delays, observed, subsystem
 from .data_sheet import (
     Deviation,
@@ -42,7 +43,7 @@ from .frozen_jacobian import refit, refit_rounded
 from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import Misfit, explained, material, misfit
-from .progress import OutOfTimeError, Progress
+from .progress import OutOfTimeError, Progress, Watch
 from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import immaterial, negligible, remainders
 from .score_test import CandidateScore, score
@@ -109,9 +110,10 @@ class Search:
         settings: FitSettings,
         say: Say,
         within: float | None = None,
+        watch: Watch | None = None,
     ) -> None:
         self.given, self.split, self.short, self.settings = model, split, short, settings
-        self.say = Progress(say, within)
+        self.say = Progress(say, within, watch or (lambda _: None))
         self.faults: list[RecordingFault] = []
         self.rivals: list[RecordingFault] = []
         """Other faults, that explain about as much as the best candidate."""
@@ -128,11 +130,12 @@ class Search:
     @classmethod
     def of(
         cls, model: Model, records: Sequence[Record], validation: Sequence[Record], settings: FitSettings, say: Say,
-        within: float | None = None,
+        within: float | None = None, watch: Watch | None = None,
     ) -> Search:  # fmt: skip
         """Cut the records; free parameters without bounds get those of a data sheet.
 
         :param within: seconds after which the search ends with the best so far
+        :param watch: takes what is found meanwhile
         :raises DiagnosisError: there are no records, or one cannot be cut.
         """
         if not records:
@@ -142,7 +145,7 @@ class Search:
         try:
             cuts = split(records, validation, model, length)
             short = partial(split, records, validation, model, shorter(length, SHORTER, [*records, *validation]))
-            return cls(model, cuts, short, replace(settings, length=length), say, within)
+            return cls(model, cuts, short, replace(settings, length=length), say, within, watch)
         except SegmentError as error:
             raise DiagnosisError(str(error)) from None
 
@@ -447,6 +450,7 @@ class Search:
         best = varied(worth, ALIKE if most < MOST_REFITS else most)[:most]
         every: list[CandidateRefit] = []
         self.tried = (base, every)
+        self._show(base, scores, every)
         for number, s in enumerate(best):
             found = self.refit(base, s)
             for start in s.others if number < FULL else ():
@@ -455,12 +459,16 @@ class Search:
                     found = min(found, again, key=lambda r: r.misfit.total)
             every.append(found)
             self.say.reached(self._added(every[-1].refit.model), every[-1].misfit)
+            self._show(base, scores, every)
         pairs = zip(every, best, strict=True)
         refits = [r for r, s in pairs if not observed(s.effect) or base.misfit.total - r.misfit.total > least]
         if base.misfit.little:
             refits = [r for r in refits if not self.within_a_sample(r)]
         refits.sort(key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
+
+    def _show(self, base: SearchState, scores: Sequence[CandidateScore], refits: Sequence[CandidateRefit]) -> None:
+        self.say.watch({"candidates": candidate_table(base, scores, refits, self._added(base.model))})
 
     def _added(self, model: Model) -> list[str]:
         return [e for e in model.effects if e not in self.given.effects]
@@ -636,9 +644,11 @@ class Search:
         if not self.given.library.is_builtin(name):  # a file of the user's own may have been made for these records
             starts.append({f"{name}.{p.name}": p.default for p in self.given.library[name].parameters})
         tried = min((self.refit(base, replace(scores[0], start=s)) for s in starts), key=lambda r: r.misfit.total)
+        self.say.reached([name], tried.misfit)
         self.say(f"fitting with {name}")
         # What the model without it left was no sure guide to noise and delays.
         final = self.judged(self.begun_anew(self.state(tried.refit.model)))
+        self.say.reached([name], final.misfit)
         base = replace(self.state(base.model, self._last), refits=[tried], scores=scores)
         found = SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
         return accidents_named(self.concluded(found))

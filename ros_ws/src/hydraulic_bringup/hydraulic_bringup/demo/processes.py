@@ -1,4 +1,4 @@
-"""Children of the demo: each in a process group of its own, with a log, and none left behind."""
+"""Children of a program: each in a process group of its own, with a log, and none left behind."""
 
 from __future__ import annotations
 
@@ -21,30 +21,38 @@ _TAIL = 12  # lines of a log that an error shows
 
 try:
     _LIBC: ctypes.CDLL | None = ctypes.CDLL(None)
-except OSError:  # no libc to ask: then only a demo that is killed outright can leave children
+except OSError:  # no libc to ask: then only a parent that is killed outright can leave children
     _LIBC = None
 
 
-def _end_with_parent() -> None:
-    """In the child, before it starts: end when the demo itself is killed outright."""
+def end_with_parent() -> None:
+    """In a child, before it starts: end when the thread that started it is killed outright."""
     if _LIBC is not None and hasattr(_LIBC, "prctl"):
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 class Child:
-    """One process of the graph; all it prints goes to ``log``."""
+    """One process of the graph; all it prints goes to ``log``. It is told things (`say`) where it ``listens``."""
 
-    def __init__(self, name: str, module: str, arguments: Sequence[str], log: Path, env: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        name: str,
+        module: str,
+        arguments: Sequence[str],
+        log: Path,
+        env: Mapping[str, str],
+        listens: bool = False,
+    ) -> None:
         self.name, self.log = name, log
         self.may_end: tuple[int, ...] = ()  # exit codes that are in order before it is stopped
         with log.open("wb") as sink:
             self._popen = subprocess.Popen(
                 [sys.executable, "-m", module, *arguments],
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE if listens else subprocess.DEVNULL,
                 stdout=sink,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                preexec_fn=_end_with_parent,
+                preexec_fn=end_with_parent,
                 env=dict(env),
             )
 
@@ -57,6 +65,15 @@ class Child:
     def exit_code(self) -> int | None:
         """None while it runs."""
         return self._popen.poll()
+
+    def say(self, line: str) -> None:
+        """Tell it a line on its standard input.
+
+        :raises OSError: it does not listen any more.
+        """
+        assert self._popen.stdin is not None
+        self._popen.stdin.write(f"{line}\n".encode())
+        self._popen.stdin.flush()
 
     def ending(self) -> str:
         """How it ended, in words."""

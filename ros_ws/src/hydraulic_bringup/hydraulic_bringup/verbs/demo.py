@@ -8,9 +8,12 @@ a page says where it fails. With ``--record`` and ``--model`` the same from ther
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
+from functools import partial
 from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 
 from rich.console import Console
@@ -26,6 +29,8 @@ from hydraulic_sysid.verbs.compare import error_table
 
 DATA_SHEET = "moog_mcr_m_1002_bench"
 RUNS = Path("runs")
+WORKBENCH = "hydraulic_workbench.nodes.workbench"
+"""Of the floor above, which need not be there."""
 _OFFLINE_S = 14.0
 SHOWN = ("position", "velocity", "load_pressure")  # channels of the table; all are in the report
 
@@ -70,12 +75,18 @@ class ProgressSteps:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the demo; 0 done, 1 a step failed, 2 bad options or input, 130 interrupted."""
-    code = cli.run(_parser(), _demo, argv, stopped="every process of the demo has been stopped")
+    shown: list[Path] = []
+    code = cli.run(_parser(), partial(_demo, shown), argv, stopped="every process of the demo has been stopped")
     online.take_down_left(code)
+    for folder in shown:
+        os.execv(sys.executable, [sys.executable, "-m", WORKBENCH, "--open", str(folder)])
     return code
 
 
-def _demo(options: argparse.Namespace) -> None:
+def _demo(shown: list[Path], options: argparse.Namespace) -> None:
+    """Run it; ``shown`` takes the folder that the workbench is to open."""
+    if options.workbench and find_spec(WORKBENCH.partition(".")[0]) is None:
+        raise cli.UsageError("--workbench: the package hydraulic_workbench is not there")
     if options.columns and not options.record:
         raise cli.UsageError("--columns: goes with --record only")
     if options.record and (options.quick or options.plant or options.lockstep is not None):
@@ -83,7 +94,9 @@ def _demo(options: argparse.Namespace) -> None:
     options.plant = options.plant or "sim"
     options.lockstep = options.lockstep is not False
     online.interrupt_on_sigterm()
-    _run(options, Console(highlight=False))
+    out = _run(options, Console(highlight=False))
+    if options.workbench:
+        shown.append(out)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -98,6 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     add_trust_option(parser)
     parser.add_argument("--plant", choices=tuple(online.PLANTS), help="what is excited (default sim)")
     parser.add_argument("--out", metavar="DIR", type=Path, help="new folder of the run (default runs/<date>-demo)")
+    parser.add_argument("--workbench", action="store_true", help="open the result in the workbench when it is there")
     parser.add_argument("--quick", action="store_true", help="experiments of a few seconds")
     parser.add_argument(
         "--lockstep",
@@ -107,7 +121,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _run(options: argparse.Namespace, console: Console) -> None:
+def _run(options: argparse.Namespace, console: Console) -> Path:
     model = load_model(options.model)
     if options.record:
         records = read_all([Path(p) for p in options.record], options.columns)
@@ -134,6 +148,7 @@ def _run(options: argparse.Namespace, console: Console) -> None:
             analysis = offline.analyse(records, test_records, model, out, steps)
     _print(analysis, console)
     console.print(f"\n{time.monotonic() - begun:.0f} s. Open the report: [bold]{analysis.page}[/bold]", soft_wrap=True)
+    return out
 
 
 def new_folder(wanted: Path | None, name: str) -> Path:

@@ -63,7 +63,24 @@ def _serve(options: argparse.Namespace) -> int:
     bench = VirtualBench(bus, None, plant, options.lockstep)
     for text in options.set:
         _store(bench, text)
+    if options.listen:
+        threading.Thread(target=_listen, args=(bench,), daemon=True).start()
     return _run(bench, faults, options.model, leave)
+
+
+def _listen(bench: VirtualBench) -> None:
+    """Begin (``+NAME:NODE``) and end (``-NAME:NODE``) faults as lines on standard input say."""
+    on: dict[str, InjectedFault] = {}
+    for line in sys.stdin:
+        sign, text = line[:1], line[1:].strip()
+        try:
+            if sign == "+" and text not in on:
+                on[text] = _fault(f"{text}@0", bench.bus)[0]
+                bench.inject(on[text])
+            elif sign == "-" and text in on:
+                bench.clear(on.pop(text))
+        except cli.UsageError as error:
+            print(f"virtual_bench: {error}", file=sys.stderr)
 
 
 def _run(bench: VirtualBench, faults: list[Timed], model: str, leave: threading.Event) -> int:
@@ -138,6 +155,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--lockstep", action="store_true", help="time passes by SYNCs alone; for a driver that is in lockstep too")
     add("--set", action="append", default=[], metavar="[NODE:]INDEX[:SUB]=VALUE", help="setting stored in a device")
     add("--fault", action="append", default=[], metavar="NAME:NODE@BEGIN[-END]", help=f"of {', '.join(FAULTS)}")
+    add("--listen", action="store_true", help="begin and end faults by lines +NAME:NODE, -NAME:NODE on standard input")
     return parser
 
 

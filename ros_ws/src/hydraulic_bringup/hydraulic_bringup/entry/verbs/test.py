@@ -54,7 +54,7 @@ def run(bench: Bench, arguments: list[str]) -> int:
         workers = len(os.sched_getaffinity(0)) + 1  # one more than processors: some always wait for nodes
         spread = ["-p", "xdist", "-n", str(workers), "--dist=loadfile", "--no-loadscope-reorder"]
         # Only these, as it takes long to collect all.
-        files = sorted(root.glob("tests/*/*.py"))
+        files = sorted(root.glob("tests/**/*.py"))
         timed = [str(file.relative_to(root)) for file in files if "mark.timing" in file.read_text("utf-8")] or ["tests"]
         runs = [
             Pytest([*pytest, "not timing", *spread, "tests"], root, variables),

@@ -1,0 +1,1 @@
+"""The bench in a browser: a node and a small web server in one process."""

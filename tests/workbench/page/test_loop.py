@@ -1,0 +1,106 @@
+"""The whole loop on one page: a hidden effect is found, added, undone; what the other verbs say of the same record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from workbench.page.steps import figure, until
+
+MOST_CLICKS = 12
+AT_THE_NOISE = 1.1
+
+
+@pytest.fixture(scope="module")
+def bench(start_bench: Callable[..., Any]) -> Iterator[Any]:
+    yield start_bench("--hide", "valve_deadband")
+
+
+@pytest.fixture(scope="module")
+def page(bench: Any) -> Iterator[Any]:
+    yield bench.open()
+    bench.close()
+
+
+def test_a_hidden_effect_is_named_and_added_within_twelve_clicks(page: Any, picture: Callable[..., None]) -> None:
+    picture(page, "loop-1-plant")
+    page.click("#start-guess")
+    page.click("#enable")
+    picture(page, "loop-2-enable", whole=False)
+    page.click("dialog .primary")
+    page.wait_for_selector("#disable")
+    page.click("#next")  # to the experiment; the recommended plan is chosen and rehearsed
+    page.wait_for_selector("#start-experiment:not([disabled])")
+    picture(page, "loop-3-rehearsed")
+    page.click("#start-experiment")
+    page.wait_for_selector("#abort")
+    until(page, "workbench.state.bench.experiment.progress > 0.3")
+    picture(page, "loop-4-running")
+    page.click('#next:has-text("Diagnose this record")')
+    page.wait_for_selector("table.candidates tbody tr")  # fills while the search runs
+    assert page.locator("#cancel-job").count() == 1
+    picture(page, "loop-5-search")
+    page.wait_for_selector("[aria-label=Verdict]")
+    verdict = page.inner_text("[aria-label=Verdict] .verdict")
+    assert verdict.startswith("Missing: valve_deadband"), verdict
+    picture(page, "loop-6-verdict")
+    page.click('[data-add="valve_deadband"]')
+    page.wait_for_selector("#cancel-job")
+    picture(page, "loop-7-adding")
+    page.wait_for_selector("ol.timeline li.current:has-text('+ valve deadband')")
+    picture(page, "loop-8-added")
+    page.click('#next:has-text("Answer: valve deadband")')
+    page.wait_for_selector('.message.good, .message:has-text("Right")')
+    left = figure(page.inner_text("ol.timeline li.current .chip"))
+    counted = page.evaluate("counted")
+    print(f"{counted['clicks']} clicks, {counted['keys']} keys, {left} x noise left")
+    assert left <= AT_THE_NOISE
+    assert counted["clicks"] <= MOST_CLICKS
+    assert counted["keys"] == 0
+
+
+def test_the_new_model_runs_beside_the_plant(page: Any, picture: Callable[..., None]) -> None:
+    page.click("#beside")
+    page.evaluate("location.hash = '#/live'")
+    page.wait_for_selector(".residual b")
+    until(page, "workbench.live.ring.has('residual_position')")
+    page.wait_for_timeout(1500)
+    picture(page, "live-model-beside")
+
+
+def test_an_added_effect_is_taken_back(page: Any) -> None:
+    page.evaluate("location.hash = '#/diagnose'")
+    page.click("#undo")
+    page.wait_for_selector("ol.timeline li.current:has-text('chosen')")
+    assert page.evaluate("workbench.state.bench.current_model.effects").count("valve_deadband") == 0
+    page.click("ol.timeline li:has-text('+ valve deadband') button:has-text('Go back to it')")
+    page.wait_for_selector("ol.timeline li.current:has-text('+ valve deadband')")
+
+
+def test_an_error_map_shows_the_samples_behind_a_place(page: Any, picture: Callable[..., None]) -> None:
+    page.click("ol.timeline li:has-text('chosen') button:has-text('Go back to it')")
+    page.wait_for_selector("ol.timeline li.current:has-text('chosen')")
+    page.click("#verb-compare")
+    page.wait_for_selector("[aria-label=Comparison]")
+    bins = page.locator(".map .bins button")
+    bins.nth(bins.count() // 2).click()
+    page.wait_for_selector(".behind series-chart canvas")
+    picture(page, "compare")
+
+
+def test_locate_names_a_subsystem(page: Any, picture: Callable[..., None]) -> None:
+    page.click("#verb-locate")
+    page.wait_for_selector("[aria-label=Location]")
+    assert page.locator("[aria-label=Location] tbody tr").count() > 3
+    picture(page, "locate")
+
+
+def test_figures_of_the_report_open_on_demand(page: Any, picture: Callable[..., None]) -> None:
+    loaded = "performance.getEntriesByType('resource').some(({name}) => name.includes('plotly.min'))"
+    assert not page.evaluate(loaded)
+    page.click("[aria-label=Report] summary >> nth=0")
+    page.wait_for_selector("plotly-figure .main-svg")
+    assert page.evaluate(loaded)
+    page.locator("plotly-figure").scroll_into_view_if_needed()
+    picture(page, "report-figure")

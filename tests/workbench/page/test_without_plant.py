@@ -1,0 +1,149 @@
+"""What needs no plant: the first paint, records from elsewhere, foreign text, accessibility."""
+
+from __future__ import annotations
+
+import gzip
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from workbench.page.steps import until
+
+PAGE = Path(__file__).parents[3] / "ros_ws/src/hydraulic_workbench/hydraulic_workbench/page"
+SAMPLE = Path(__file__).parents[3] / "examples" / "sample_bench"
+FIRST_PAINT_MS = 1000
+MOST_BYTES = 1_000_000
+HOSTILE = '<img src=x onerror="window.hacked=1">'
+TABS = ("plant", "live", "experiment", "records", "diagnose")
+
+
+@pytest.fixture(scope="module")
+def bench(start_bench: Callable[..., Any]) -> Iterator[Any]:
+    bench = start_bench()
+    yield bench
+    bench.close()
+
+
+def table(header: str, time_factor: float = 1000.0) -> bytes:
+    """A part of a sample record under names and units of somebody else."""
+    lines = gzip.decompress((SAMPLE / "steps.csv.gz").read_bytes()).decode().splitlines()
+    names = lines[0].split(",")
+    time = next(k for k, name in enumerate(names) if "time" in name)
+    rows = [line.split(",") for line in lines[1:3001]]
+    for row in rows:
+        row[time] = repr(round(float(row[time]) * time_factor, 6))
+    new = [header, *(f"c{k}" for k in range(1, len(names)))]
+    return "\n".join([",".join(new), *(",".join(row) for row in rows)]).encode()
+
+
+def test_the_first_paint_takes_less_than_a_second(bench: Any) -> None:
+    page = bench.open()
+    paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
+    bytes_ = page.evaluate("""performance.getEntriesByType('resource')
+        .concat(performance.getEntriesByType('navigation'))
+        .filter(({name}) => !name.includes('plotly')).reduce((sum, one) => sum + one.decodedBodySize, 0)""")
+    print(f"first paint after {paint:.0f} ms, {bytes_ / 1e3:.0f} kB")
+    assert paint < FIRST_PAINT_MS
+    assert bytes_ < MOST_BYTES
+    assert sum(file.stat().st_size for file in PAGE.rglob("*") if file.is_file()) < MOST_BYTES
+
+
+def test_every_module_is_asked_for_at_once() -> None:
+    index = (PAGE / "index.html").read_text()
+    modules = [file.relative_to(PAGE).as_posix() for file in PAGE.rglob("*.js")]
+    assert sorted(re.findall(r'modulepreload" href="/page/([^"]+)"', index)) == sorted(modules)
+
+
+def test_the_page_asks_nobody_else(bench: Any) -> None:
+    page = bench.open()
+    hosts = page.evaluate("[...new Set(performance.getEntriesByType('resource').map(({name}) => new URL(name).host))]")
+    assert hosts == [page.evaluate("location.host")]
+    assert "token" not in page.url
+
+
+def test_columns_are_named_by_choosing_and_kept(bench: Any, picture: Callable[..., None]) -> None:
+    page = bench.open(tab="records")
+    page.set_input_files("#choose-files", {"name": "foreign.csv", "mimeType": "text/csv", "buffer": table("t")})
+    page.wait_for_selector("table.columns-map")
+    page.select_option("[aria-label='Column of Time'], [aria-label='Column of time']", "t")
+    page.select_option("[aria-label='Unit of time']", "ms")
+    for channel, column in (("drive", "c1"), ("position", "c2")):
+        page.select_option(f"[aria-label='Column of {channel}']", column)
+    page.select_option("[aria-label='Unit of position']", "mm")
+    page.wait_for_selector("#finish-import:not([disabled])")
+    page.wait_for_selector("series-chart canvas")
+    picture(page, "records-columns")
+    page.click("#finish-import")
+    page.wait_for_selector("table.records th:has-text('foreign')")
+    page.wait_for_selector("[aria-label=Overlay] series-chart canvas")
+    assert page.locator("table.records tr:has-text('foreign') :text('columns:')").count() == 1
+
+
+def test_two_records_and_a_model_over_each_other(bench: Any, picture: Callable[..., None]) -> None:
+    page = bench.open(tab="records")
+    for name in ("steps.csv.gz", "triangle.csv.gz"):  # their headers name the columns
+        page.set_input_files("#choose-files", SAMPLE / name)
+        page.click("#finish-import:not([disabled])")
+        page.wait_for_selector("#choose-files", state="attached")
+    page.click("[aria-label='List of records'] tr.chosen input")  # the last one that came is shown
+    boxes = page.locator("table.records input[type=checkbox]")
+    boxes.nth(0).check()
+    boxes.nth(1).check()
+    drawn = (
+        "count => document.querySelectorAll('[aria-label=Overlay] series-chart:first-of-type .legend').length === count"
+    )
+    until(page, drawn, 2)
+    page.select_option("#overlay-model", label="sample_bench")
+    until(page, drawn, 3)
+    picture(page, "records-overlay")
+
+
+def test_foreign_text_stays_text(bench: Any) -> None:
+    page = bench.open(tab="records")
+    page.set_input_files("#choose-files", {"name": "hostile.csv", "mimeType": "text/csv", "buffer": table(HOSTILE)})
+    page.wait_for_selector("table.sample")
+    assert HOSTILE in page.inner_text("table.sample")
+    assert page.evaluate("window.hacked") is None
+    page.click("[aria-label='Bring a record'] button:has-text('Cancel')")
+
+
+def test_keys_go_through_the_tabs(bench: Any, picture: Callable[..., None]) -> None:
+    page = bench.open()
+    for number, tab in enumerate(TABS, 1):
+        page.keyboard.press(str(number))
+        page.wait_for_selector(f'.rail a[href="#/{tab}"][aria-current="page"]')
+    page.keyboard.press("?")
+    page.wait_for_selector("dialog[open]")
+    picture(page, "help", whole=False)
+    page.keyboard.press("Escape")
+    page.wait_for_selector("dialog", state="detached")
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_no_serious_fault_of_accessibility(bench: Any, picture: Callable[..., None], dark: bool) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    page = bench.open(dark=dark)
+    found = []
+    for tab in TABS:
+        page.evaluate("tab => { location.hash = `#/${tab}`; }", tab)
+        page.wait_for_selector(f'.rail a[href="#/{tab}"][aria-current="page"]')
+        page.wait_for_timeout(300)
+        picture(page, f"{tab}-{'dark' if dark else 'light'}")
+        for fault in axe.run(page).response["violations"]:
+            if fault["impact"] in ("serious", "critical"):
+                found.append(f"{tab}: {fault['id']}: {[node['target'] for node in fault['nodes']][:4]}")
+    assert not found, "\n".join(found)
+
+
+def test_every_tab_fits_a_phone(bench: Any, picture: Callable[..., None]) -> None:
+    page = bench.open(width=390, height=844)
+    for tab in TABS:
+        page.evaluate("tab => { location.hash = `#/${tab}`; }", tab)
+        page.wait_for_selector(f'.rail a[href="#/{tab}"][aria-current="page"]')
+        page.wait_for_timeout(300)
+        wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+        assert wide <= 0, f"{tab}: the page is {wide} px too wide"
+        assert page.locator("#stop").is_visible()
+        picture(page, f"{tab}-phone")
