@@ -2,11 +2,12 @@
 
 A map is a YAML file::
 
-    time: {column: t, unit: s}           # or {dt: 0.02}; irregular: error | resample | split
+    time: {column: t, unit: s}           # or {dt: 0.02}; irregular: error | resample | split; step: 0.005 to resample to
     channels:
       drive: {column: u, unit: V}        # by its name in the header (MAT: the variable) …
       position: {column: 3, unit: mm, scale: 20.0, offset: -100.0, sign: -1}    # … or its number, from 1
       pressure_b: null                   # absent, as a channel that is not named
+      # held: false    resampled by straight lines, though a drive; true: kept until the next sample, though no drive
     extra:
       speed_signal: {column: 4, unit: V} # a channel of its own, for which no SI unit is known
     header: false                        # header, delimiter and decimal are found out where they are left out
@@ -69,6 +70,8 @@ class Column:
     sign: int = 1
     scale: float = 1.0
     offset: float = 0.0
+    held: bool | None = None
+    """Whether it keeps its value until the next sample, where that is not as of every such channel (`HELD`)."""
 
     def si(self, numbers: Any) -> Any:
         """Numbers of the file in SI."""
@@ -97,6 +100,8 @@ class ColumnMap:
     notes: Sequence[str] = field(default_factory=tuple)
     files: Mapping[str, Mapping[str, Column]] = field(default_factory=dict)
     settings: Mapping[str, float | Column] = field(default_factory=dict)
+    step: float | None = None
+    """Period [s] to resample to, where it is not the median of the stamps'."""
 
     def for_file(self, name: str) -> ColumnMap:
         """The map of a file of this name: with what ``files`` says of it.
@@ -169,10 +174,14 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
     for name, part in parts.items():
         if not part and not files:
             raise ColumnMapError(f"{where}: {f'records.{name}' if name else 'channels'} maps no channel")
-    time = _mapping(top.get("time", {}), f"{where}: time", ("column", "unit", "scale", "dt", "irregular"))
+    time = _mapping(top.get("time", {}), f"{where}: time", ("column", "unit", "scale", "dt", "irregular", "step"))
     if ("dt" in time) == ("column" in time) and (parts or "dt" in time):
         raise ColumnMapError(f"{where}: time needs either 'column' or 'dt' (the period in seconds)")
     irregular = _choice(time.get("irregular", "error"), f"{where}: time.irregular", IRREGULAR)
+    step = None if "step" not in time else _number(time["step"], f"{where}: time.step")
+    if step is not None and (irregular != "resample" or step <= 0.0):
+        raise ColumnMapError(f"{where}: time.step is {step:g} s with irregular: {irregular}; it must be positive, and "
+                             "goes with irregular: resample")  # fmt: skip
     dt, column = None, None
     if "dt" in time:
         dt = _number(time["dt"], f"{where}: time.dt")
@@ -198,6 +207,7 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
         tuple(notes),
         files,
         _settings(top.get("settings", {}), f"{where}: settings"),
+        step,
     )
 
 
@@ -277,7 +287,7 @@ def _settings(document: Any, where: str) -> dict[str, float | Column]:
 
 
 def _column(document: Any, quantity: str | None, where: str) -> Column:
-    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset"))
+    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset", "held"))
     if "column" not in entry:
         raise ColumnMapError(f"{where}: 'column' is missing (a name in the header, or a number from 1)")
     column = entry["column"]
@@ -293,7 +303,8 @@ def _column(document: Any, quantity: str | None, where: str) -> Column:
     unit = entry["unit"]
     offset = _number(entry.get("offset", 0.0), f"{where}.offset")
     factors = (1.0, 0.0) if quantity is None else _si_factors(unit, quantity, where)
-    return Column(column, unit, *factors, sign, scale, offset)
+    held = _choice(entry.get("held"), f"{where}.held", (True, False, None))
+    return Column(column, unit, *factors, sign, scale, offset, held)
 
 
 def _si_factors(unit: str, quantity: str, where: str) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -59,6 +59,7 @@ class Samples:
     row: Callable[[int], int]
     column: str | int
     units: Mapping[str, str] = field(default_factory=dict)
+    held: Collection[str] = HELD
 
 
 def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list[Record]:
@@ -100,9 +101,10 @@ def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list
         for number, (first, last, own) in enumerate(pieces := _constant(given, time.size), 1):
             stretch = {name: values[first:last] for name, values in channels.items()}
             row = partial(_row, table, first)
-            samples = Samples(table.path, time[first:last], stretch, row, place, columns.units)
+            held = {n for n, c in mapped.items() if (n in HELD if c.held is None else c.held)} | (HELD - mapped.keys())
+            samples = Samples(table.path, time[first:last], stretch, row, place, columns.units, held)
             label = f"{title}.{number}" if len(pieces) > 1 else title
-            records += evenly_sampled(samples, columns.irregular, label, notes, description | own)
+            records += evenly_sampled(samples, columns.irregular, label, notes, description | own, columns.step)
     return records
 
 
@@ -132,8 +134,9 @@ def _constant(given: Mapping[str, float | Array], count: int) -> list[tuple[int,
 
 
 def evenly_sampled(
-    samples: Samples, irregular: str, name: str, notes: list[str], description: Mapping[str, Any]
-) -> list[Record]:
+    samples: Samples, irregular: str, name: str, notes: list[str], description: Mapping[str, Any],
+    step: float | None = None,
+) -> list[Record]:  # fmt: skip
     """The samples as one record, or as several where ``irregular`` is "split" and samples are missing.
 
     :raises TimeError: the stamps do not increase, or are not even and ``irregular`` is "error".
@@ -142,7 +145,7 @@ def evenly_sampled(
     try:
         sampling.increasing(time)
         if irregular == "resample":
-            return [_resampled(samples, name, notes, description)]
+            return [_resampled(samples, name, notes, description, step)]
         spans = [(0, time.size)]
         if irregular == "split":
             bounds = [0, *sampling.gaps(time), time.size]
@@ -188,10 +191,12 @@ def _records(
         yield Record.sampled(title, even.dt, channels, samples.path, described, samples.units)
 
 
-def _resampled(samples: Samples, name: str, notes: Sequence[str], description: Mapping[str, Any]) -> Record:
-    """On the even grid with the median period; drives hold their value, the rest is interpolated linearly."""
+def _resampled(
+    samples: Samples, name: str, notes: Sequence[str], description: Mapping[str, Any], step: float | None = None
+) -> Record:
+    """On the even grid with this period, or the median one; drives hold their value, the rest is interpolated linearly."""
     time = samples.time
-    dt = float(f"{np.median(np.diff(time)):.9g}")
+    dt = step or float(f"{np.median(np.diff(time)):.9g}")
     span = float(time[-1] - time[0])
     if span > _MOST_SAMPLES * dt:
         problem = f"resampling {span:.6g} s every {dt:.6g} s makes more than {_MOST_SAMPLES} samples"
@@ -200,7 +205,7 @@ def _resampled(samples: Samples, name: str, notes: Sequence[str], description: M
     grid = time[0] + dt * np.arange(count)
     before = np.clip(np.searchsorted(time, grid + 1e-6 * dt, side="right") - 1, 0, time.size - 1)
     channels = {
-        channel: values[before] if channel in HELD else np.interp(grid, time, values)
+        channel: values[before] if channel in samples.held else np.interp(grid, time, values)
         for channel, values in samples.channels.items()
     }
     longest = float(np.diff(time).max())
