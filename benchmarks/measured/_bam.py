@@ -11,7 +11,8 @@ where it can, and is at most a budget τ_fm, which the six models state (docs/th
 The measure is theirs (bam/mae.py): logs resampled to 5 ms by straight lines, a run from the first sample over the whole
 log, the mean of |simulated − measured| per log, and of that the mean over logs.
 
-M. Duclusaud, G. Passault, V. Padois, O. Ly, Extended Friction Models for the Physics Simulation of Servo Actuators, 2024.
+M. Duclusaud, G. Passault, V. Padois, O. Ly, Extended Friction Models for the Physics Simulation of Servo Actuators
+(2024).
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ import numpy as np
 from numba import njit
 from scipy.optimize import differential_evolution, minimize
 
-from hydraulic_sim.model import Model
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.parameters import scale
 
@@ -75,8 +76,8 @@ def read_log(path: Path) -> Log:
     number = {key: float(content.get(key, 0.0)) for key in ("kp", "vin", "mass", "arm_mass", "length", "damping")}
     return Log(
         path.stem, content["trajectory"], **number, goal=column("goal_position"),
-        held=np.array([e["goal_position"] for e in entries])[np.searchsorted(stamps, grid + 1e-9) - 1], position=column("position"),
-        speed=column("speed"), enabled=(column("torque_enable") > 0.5).astype(float),
+        held=np.array([e["goal_position"] for e in entries])[np.searchsorted(stamps, grid + 1e-9) - 1],
+        position=column("position"), speed=column("speed"), enabled=(column("torque_enable") > 0.5).astype(float),
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 A map is a YAML file::
 
-    time: {column: t, unit: s}           # or {dt: 0.02}; irregular: error | resample | split; step: 0.005 to resample to
+    time: {column: t, unit: s}           # or {dt: 0.02}; irregular: error | resample (to step: 0.005) | split
     channels:
       drive: {column: u, unit: V}        # by its name in the header (MAT: the variable) …
       position: {column: 3, unit: mm, scale: 20.0, offset: -100.0, sign: -1}    # … or its number, from 1
@@ -20,6 +20,11 @@ channel in other files of a set, as of a transducer that was moved, ``files`` ha
     files:
       "*_pA_*": {pressure_a: {column: p, unit: MPa}}
       "*_pB_*": {pressure_b: {column: p, unit: MPa}}
+
+Cells that are lists have their numbers as ``positions[2]``, the second. ``file`` takes a column from another file of
+the same folder, read at the stamps of the first; such a record is called after the folder::
+
+      position: {column: "positions[2]", unit: rad, file: state_motor.csv}
 
 What a record states of the machine itself, a load that was put on or a gain that was set, is said under ``settings``,
 by the key of the model's parameter: a number [SI], or a column. Where that changes, another record begins::
@@ -41,7 +46,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from importlib import resources
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from hydraulic_interfaces.errors import one_line
@@ -70,6 +75,7 @@ class Column:
     sign: int = 1
     scale: float = 1.0
     offset: float = 0.0
+    file: str | None = None
     held: bool | None = None
     """Whether it keeps its value until the next sample, where that is not as of every such channel (`HELD`)."""
 
@@ -102,6 +108,11 @@ class ColumnMap:
     settings: Mapping[str, float | Column] = field(default_factory=dict)
     step: float | None = None
     """Period [s] to resample to, where it is not the median of the stamps'."""
+
+    @property
+    def several_files(self) -> bool:
+        """Whether a record's columns stand in more than one file."""
+        return any(column.file for part in self.parts.values() for column in part.values())
 
     def for_file(self, name: str) -> ColumnMap:
         """The map of a file of this name: with what ``files`` says of it.
@@ -287,7 +298,7 @@ def _settings(document: Any, where: str) -> dict[str, float | Column]:
 
 
 def _column(document: Any, quantity: str | None, where: str) -> Column:
-    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset", "held"))
+    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset", "held", "file"))
     if "column" not in entry:
         raise ColumnMapError(f"{where}: 'column' is missing (a name in the header, or a number from 1)")
     column = entry["column"]
@@ -304,7 +315,10 @@ def _column(document: Any, quantity: str | None, where: str) -> Column:
     offset = _number(entry.get("offset", 0.0), f"{where}.offset")
     factors = (1.0, 0.0) if quantity is None else _si_factors(unit, quantity, where)
     held = _choice(entry.get("held"), f"{where}.held", (True, False, None))
-    return Column(column, unit, *factors, sign, scale, offset, held)
+    file = entry.get("file")
+    if file is not None and (not isinstance(file, str) or not file or PurePath(file).name != file):
+        raise ColumnMapError(f"{where}.file is {file!r}, must be the name of a file in the same folder")
+    return Column(column, unit, *factors, sign, scale, offset, file, held)
 
 
 def _si_factors(unit: str, quantity: str, where: str) -> tuple[float, float]:

@@ -73,6 +73,8 @@ def _read(path: Path, columns: ColumnMap | None) -> list[Record]:
         return read_bag(path, columns.irregular if columns else "error")
     name = path.name[: -len(suffix_of(path))]
     columns = columns and columns.for_file(path.name)
+    if columns and columns.several_files:
+        name = path.absolute().parent.name
     return records_of_table(format_of(path).table(path, columns), columns, name)
 
 

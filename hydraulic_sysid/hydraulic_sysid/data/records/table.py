@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.data.errors import FileError, TimeError
+from hydraulic_sysid.data.errors import ColumnMapError, FileError, TimeError
 from hydraulic_sysid.data.records import sampling
 from hydraulic_sysid.data.records.channels import HELD
 from hydraulic_sysid.data.records.column_map import Column, ColumnMap
@@ -74,7 +74,7 @@ def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list
     records = []
     for part, mapped in columns.parts.items():
         notes = list(columns.notes)
-        channels = {channel: _finite(table, column) for channel, column in mapped.items()}
+        channels = {channel: _channel(table, column, columns) for channel, column in mapped.items()}
         title = f"{name}.{part}" if part else name
         kept = {key: value for key, value in table.description.items() if key not in _ANEW}
         notes += [n for n in table.description.get("notes", ()) if isinstance(n, str)]
@@ -106,6 +106,27 @@ def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list
             label = f"{title}.{number}" if len(pieces) > 1 else title
             records += evenly_sampled(samples, columns.irregular, label, notes, description | own, columns.step)
     return records
+
+
+def _channel(table: Table, column: Column, columns: ColumnMap) -> Array:
+    """Samples (N,) of a channel [SI], those of another file at the stamps of the first.
+
+    :raises FileError: the other file is not there, or has no such column.
+    :raises ColumnMapError: without a column of stamps the two do not belong together.
+    """
+    if column.file is None:
+        return _finite(table, column)
+    from hydraulic_sysid.data.records.formats import format_of  # which needs the errors of this package itself
+
+    if columns.time is None:
+        raise ColumnMapError(f"{columns.name}: {column.file}: a column of another file needs a time column in both")
+    path = table.path.parent / column.file
+    if not path.is_file():
+        raise FileError(path, "does not exist")
+    other: Table = format_of(path).table(path, columns)
+    stamps, wanted = (_finite(one, columns.time) for one in (other, table))
+    sampling.increasing(stamps)
+    return np.interp(wanted, stamps, _finite(other, column))
 
 
 def _row(table: Table, first: int, index: int) -> int:
@@ -194,7 +215,7 @@ def _records(
 def _resampled(
     samples: Samples, name: str, notes: Sequence[str], description: Mapping[str, Any], step: float | None = None
 ) -> Record:
-    """On the even grid with this period, or the median one; drives hold their value, the rest is interpolated linearly."""
+    """On the even grid with this period, or the median one; drives hold their value, the rest is straight lines."""
     time = samples.time
     dt = step or float(f"{np.median(np.diff(time)):.9g}")
     span = float(time[-1] - time[0])
