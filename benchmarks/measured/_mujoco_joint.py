@@ -3,8 +3,8 @@
     python benchmarks/measured/_mujoco_joint.py RECORDS.npz RESULT.json
 
 RECORDS.npz holds time, command and position (N,) of each record as ``NAME/time`` and so on; those called ``fit.…`` are
-fitted, those called ``test.…`` are run with what came out. The joint is a hinge with a position actuator; identified are
-the actuator's gains, damping, armature and dry friction of the joint, mass and centre of mass of the arm. It runs in an
+fitted, those called ``test.…`` are run with what came out. The joint is a hinge with a position actuator; identified
+are the actuator's gains, damping, armature and dry friction of the joint, mass and centre of mass of the arm. It runs in an
 interpreter of its own: nothing here needs the packages of the bench.
 """
 
@@ -95,7 +95,7 @@ def main() -> None:
         p = predicted[0][0] if isinstance(predicted[0], (list, tuple)) else predicted[0]
         angle = np.interp(series[n]["time"], p.times, np.ravel(p.data))
         errors[n] = float(np.sqrt(np.mean((angle - series[n]["position"]) ** 2)))
-    values = {key: np.ravel(done[key].value).tolist() for key in done.keys()}
+    values = {key: np.ravel(done[key].value).tolist() for key in list(done.keys())}
     Path(sys.argv[2]).write_text(
         json.dumps({"version": mujoco.__version__, "rmse": errors, "parameters": values, "free": int(done.size)})
     )

@@ -96,4 +96,5 @@ def test_keys_of_a_model_are_those_of_its_effects(bare: Model, everything: Model
     always = {f"{e.name}.{p.name}" for e in library().values() if e.always_on for p in e.parameters}
     expected = {p.name for p in base.PARAMETERS} | always
     assert set(bare.keys()) == expected
-    assert set(everything.keys()) == expected | {f"{e.name}.{p.name}" for e in library().values() for p in e.parameters}
+    on = (library()[name] for name in everything.effects)
+    assert set(everything.keys()) == expected | {f"{e.name}.{p.name}" for e in on for p in e.parameters}
