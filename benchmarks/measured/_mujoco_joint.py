@@ -4,8 +4,8 @@
 
 RECORDS.npz holds time, command and position (N,) of each record as ``NAME/time`` and so on; those called ``fit.…`` are
 fitted, those called ``test.…`` are run with what came out. The joint is a hinge with a position actuator; identified
-are the actuator's gains, damping, armature and dry friction of the joint, mass and centre of mass of the arm. It runs in an
-interpreter of its own: nothing here needs the packages of the bench.
+are the actuator's gains, damping, armature and dry friction of the joint, mass and centre of mass of the arm. It runs
+in an interpreter of its own: nothing here needs the packages of the bench.
 """
 
 from __future__ import annotations

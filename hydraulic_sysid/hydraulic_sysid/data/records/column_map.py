@@ -34,8 +34,10 @@ by the key of the model's parameter: a number [SI], or a column. Where that chan
       position_loop.active: {column: torque_enable}
 
 A rotary axis is described at a radius of 1 m: an angle (rad, deg) counts as the arc in m, its speed (rad/s) in m/s, a
-torque (N*m) as the force in N. Where the actuator has a position controller of its own the drive is its command: a
-position (m, mm) or an angle counts as so many volts.
+torque (N*m) as the force in N. Where the actuator has a position controller of its own the drive is its command: an
+angle counts as so many volts, and so does a position with ``command: position`` beside its unit (else mm is no drive)::
+
+      drive: {column: goal, unit: mm, command: position}
 """
 
 from __future__ import annotations
@@ -54,7 +56,7 @@ from hydraulic_sysid.data.errors import ColumnMapError
 from hydraulic_sysid.data.records.channels import CHANNELS, TIME, allowed, si_unit
 
 IRREGULAR = ("error", "resample", "split")
-_AT_ONE_METRE = {"m": ("rad",), "m/s": ("rad/s",), "N": ("N*m",), "V": ("m", "rad")}
+_AT_ONE_METRE = {"m": ("rad",), "m/s": ("rad/s",), "N": ("N*m",), "V": ("rad",)}
 """What counts as a channel's unit too: a rotary axis at a radius of 1 m, and a position that is the command."""
 _ANGLE = re.compile(r"rad|deg|rev|turn")
 
@@ -298,7 +300,7 @@ def _settings(document: Any, where: str) -> dict[str, float | Column]:
 
 
 def _column(document: Any, quantity: str | None, where: str) -> Column:
-    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset", "held", "file"))
+    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset", "held", "file", "command"))
     if "column" not in entry:
         raise ColumnMapError(f"{where}: 'column' is missing (a name in the header, or a number from 1)")
     column = entry["column"]
@@ -313,7 +315,11 @@ def _column(document: Any, quantity: str | None, where: str) -> Column:
         raise ColumnMapError(f"{where}: 'unit' is {entry.get('unit')!r}, a text is needed; {wanted}")
     unit = entry["unit"]
     offset = _number(entry.get("offset", 0.0), f"{where}.offset")
-    factors = (1.0, 0.0) if quantity is None else _si_factors(unit, quantity, where)
+    commanded = _choice(entry.get("command"), f"{where}.command", ("position", None)) is not None
+    if commanded and (quantity is None or si_unit(quantity) != "V"):
+        raise ColumnMapError(f"{where}.command: position is said of a drive or a command alone")
+    position = "position" if commanded and not _ANGLE.search(unit) else quantity
+    factors = (1.0, 0.0) if position is None else _si_factors(unit, position, where)
     held = _choice(entry.get("held"), f"{where}.held", (True, False, None))
     file = entry.get("file")
     if file is not None and (not isinstance(file, str) or not file or PurePath(file).name != file):
