@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from workbench.page.steps import start_simulator, until
+from page_steps import start_simulator, until
 
 REDRAWS = 25.0  # per second, wanted of a free machine
 SHARED = 0.5  # of that, on a machine that runs other tests beside
