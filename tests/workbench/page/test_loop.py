@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from workbench.page.steps import figure, until
+from page_steps import figure, until
 
 MOST_CLICKS = 12
 AT_THE_NOISE = 1.1

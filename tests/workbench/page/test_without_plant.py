@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from workbench.page.steps import until
+from page_steps import until
 
 PAGE = Path(__file__).parents[3] / "ros_ws/src/hydraulic_workbench/hydraulic_workbench/page"
 SAMPLE = Path(__file__).parents[3] / "examples" / "sample_bench"

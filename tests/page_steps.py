@@ -1,4 +1,4 @@
-"""What a user does in several tests."""
+"""What a user does on the page of the workbench in several tests."""
 
 from __future__ import annotations
 
