@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from page_steps import start_simulator, until
 
+pytestmark = pytest.mark.timing  # a bench that runs by the wall clock, and a browser that follows it
+
 REDRAWS = 25.0  # per second, wanted of a free machine
 SHARED = 0.5  # of that, on a machine that runs other tests beside
 

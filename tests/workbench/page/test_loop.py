@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from page_steps import figure, until
 
+pytestmark = pytest.mark.timing  # a bench that runs by the wall clock, and a browser that follows it
+
 MOST_CLICKS = 12
 AT_THE_NOISE = 1.1
 

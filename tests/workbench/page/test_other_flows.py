@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from page_steps import start_simulator, until
 
+pytestmark = pytest.mark.timing  # a bench that runs by the wall clock, and a browser that follows it
+
 
 @pytest.fixture(scope="module")
 def bench(start_bench: Callable[..., Any]) -> Iterator[Any]:
