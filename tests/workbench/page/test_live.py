@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from page_steps import start_simulator, until
 
-pytestmark = pytest.mark.timing  # a bench that runs by the wall clock, and a browser that follows it
+pytestmark = pytest.mark.skipif(
+    "BENCH_BROWSER" not in os.environ, reason="minutes of a browser beside a bench by the wall clock: BENCH_BROWSER=1 runs it"
+)
 
 REDRAWS = 25.0  # per second, wanted of a free machine
 SHARED = 0.5  # of that, on a machine that runs other tests beside
