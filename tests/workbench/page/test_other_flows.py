@@ -10,7 +10,7 @@ import pytest
 from page_steps import start_simulator, until
 
 pytestmark = pytest.mark.skipif(
-    "BENCH_BROWSER" not in os.environ, reason="minutes of a browser beside a bench by the wall clock: BENCH_BROWSER=1 runs it"
+    "BENCH_BROWSER" not in os.environ, reason="minutes beside a bench by the wall clock: BENCH_BROWSER=1 runs it"
 )
 
 
