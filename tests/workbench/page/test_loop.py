@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from page_steps import figure, until
-
-pytestmark = pytest.mark.skipif(
-    "BENCH_BROWSER" not in os.environ, reason="minutes beside a bench by the wall clock: BENCH_BROWSER=1 runs it"
-)
 
 MOST_CLICKS = 12
 AT_THE_NOISE = 1.1

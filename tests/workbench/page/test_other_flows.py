@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from page_steps import start_simulator, until
-
-pytestmark = pytest.mark.skipif(
-    "BENCH_BROWSER" not in os.environ, reason="minutes beside a bench by the wall clock: BENCH_BROWSER=1 runs it"
-)
 
 
 @pytest.fixture(scope="module")

@@ -38,6 +38,7 @@ def table(header: str, time_factor: float = 1000.0) -> bytes:
     return "\n".join([",".join(new), *(",".join(row) for row in rows)]).encode()
 
 
+@pytest.mark.timing
 def test_the_first_paint_takes_less_than_a_second(bench: Any) -> None:
     page = bench.open()
     paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
