@@ -434,6 +434,9 @@ def test_what_protects_the_bench_is_not_among_them() -> None:
         "plant_node/test_lockstep.py",
         "plant_node/test_plant_loop.py",
         "system/test_vcan.py",
+        "workbench/page/test_live.py",  # redraws per second
+        "workbench/page/test_without_plant.py",  # the first paint
+        "workbench/test_workbench_node.py",  # milliseconds from the stop button to 0 V
     }
     assert not re.search(r"rerun|flaky|repeat", (ROOT / "pyproject.toml").read_text().partition("[tool.")[0])
 

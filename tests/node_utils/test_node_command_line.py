@@ -48,7 +48,7 @@ def test_nodes_are_found_on_this_machine_only_by_default(
 
 
 def test_every_executable_node_starts_this_way() -> None:
-    """Nobody else calls rclpy.init, but the client of a demo, in the environment that the demo has made."""
+    """Nobody else calls rclpy.init, but what is more than a node: the client of a demo, the server of the workbench."""
     callers = {
         file.relative_to(WORKSPACE).as_posix()
         for package in WORKSPACE.iterdir()
@@ -58,5 +58,6 @@ def test_every_executable_node_starts_this_way() -> None:
     assert callers == {
         "hydraulic_node_utils/hydraulic_node_utils/nodes/command_line.py",
         "hydraulic_bringup/hydraulic_bringup/nodes/_graph_client.py",
+        "hydraulic_workbench/hydraulic_workbench/nodes/workbench.py",
         "hydraulic_bringup/hydraulic_bringup/entry/virtualenv.py",  # sees whether rclpy starts
     }

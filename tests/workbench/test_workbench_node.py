@@ -102,6 +102,7 @@ def bench(launch: Any, client: Any, compiled_physics: None, tmp_path: Path) -> A
 def test_whatever_becomes_of_page_and_server_the_plant_is_safe(bench: Any, client: Any, wait_until: Any) -> None:
     plant, server = bench
     states = client.collect("state")
+    wait_until(lambda: states, "the first state")
 
     def drive() -> float:
         return float(states[-1].effort[1])
@@ -153,6 +154,7 @@ def test_the_stop_button_gives_0_v_within_50_ms(bench: Any, client: Any, wait_un
     """From the press to the stamp of the first state with 0 V, while another program keeps a core busy."""
     _, server = bench
     states, source = client.collect("state"), client.source("tester", 1.0)
+    wait_until(lambda: states, "the first state")
     busy = subprocess.Popen([sys.executable, "-c", "while True: sum(range(1000))"])
 
     async def press() -> list[float]:

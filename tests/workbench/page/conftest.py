@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from conftest import Process
-from workbench.page.steps import PATIENCE_MS, until
+from page_steps import PATIENCE_MS, until
 
 REQUIRED = "BENCH_REQUIRE_BROWSER"
 """Set where a browser has been installed: a test without it is then a failure."""

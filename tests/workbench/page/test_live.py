@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from workbench.page.steps import start_simulator, until
+from page_steps import start_simulator, until
 
-REDRAWS = 25.0  # per second, wanted of a free machine
-SHARED = 0.5  # of that, on a machine that runs other tests beside
+REDRAWS = 25.0  # per second, wanted of the machine that benchmarks/workbench.py runs on
+SLOW_MACHINE = 0.5  # of that
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +33,12 @@ def redraws_per_second(page: Any, seconds: float = 3.0) -> float:
     return float((after - before) / (now - then) * 1000)
 
 
+@pytest.mark.timing
 def test_live_plots_run(page: Any, picture: Callable[..., None]) -> None:
     until(page, "workbench.live.ring.length > 2000")
     rate = redraws_per_second(page)
     print(f"{rate:.1f} redraws/s")
-    assert rate > SHARED * REDRAWS
+    assert rate > SLOW_MACHINE * REDRAWS
     assert page.evaluate("workbench.live.gaps") == 0
     picture(page, "live")
 
@@ -49,10 +50,9 @@ def test_a_controller_is_tuned_live_and_taken_back(page: Any, picture: Callable[
     slider = page.locator(".gains .slider input").first
     value = page.locator(".gains .slider b").first
     before = value.inner_text()
-    slider.evaluate(
-        "e => { e.value = Number(e.min) + 0.7 * (e.max - e.min); e.dispatchEvent(new Event('input', {bubbles: true})); }"  # noqa: E501
-    )
-    assert value.inner_text() != before
+    slider.evaluate("e => { e.value = Number(e.min) + 0.7 * (e.max - e.min); }")
+    slider.dispatch_event("input")
+    until(page, "before => document.querySelector('.gains .slider b').innerText !== before", before)
     page.click("#undo-gains:not([disabled])")
     until(page, "before => document.querySelector('.gains .slider b').innerText === before", before)
     until(page, "workbench.live.ring.has('reference')")
@@ -68,17 +68,15 @@ def test_zoom_shows_every_sample_and_cursors_read(page: Any, picture: Callable[.
     page.mouse.move(plot["x"] + 0.74 * plot["width"], middle, steps=4)
     page.mouse.up()
     page.wait_for_selector('#pause[aria-pressed="true"]')
-    seen = page.evaluate("""() => {
+    span, drawn, kept = page.evaluate("""() => {
         const strips = document.querySelector("live-strips");
         const [from, to] = strips.span;
-        const times = Array.from(strips.panels[0].plot.data[0]).filter((t) => t >= from && t <= to);
-        const steps = times.slice(1).map((t, k) => t - times[k]);
-        return [to - from, times.length, Math.max(...steps)];
+        const drawn = Array.from(strips.panels[0].plot.data[0]).filter((t) => t >= from && t < to);
+        return [to - from, drawn.length, strips.frozen.place(to) - strips.frozen.place(from)];
     }""")
-    span, count, longest = seen
     assert 0.2 < span < 1.0
-    assert longest < 0.0015, "a sample is missing"
-    assert count == pytest.approx(1000 * span, abs=2)
+    assert drawn == kept > 150, "a sample is not drawn"
+    assert page.evaluate("workbench.live.gaps") == 0, "a sample did not arrive"
     page.mouse.click(plot["x"] + 0.3 * plot["width"], middle)
     page.mouse.click(plot["x"] + 0.6 * plot["width"], middle)
     assert page.locator("h2:has-text('Cursors')").count() == 1

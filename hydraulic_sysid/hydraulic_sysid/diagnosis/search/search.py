@@ -515,7 +515,7 @@ class Search:
         at_bound, library = base.linearisation.parameters.at_bound, base.model.library
         seen, others = {subsystem(library[r.name]) for r in near}, list[CandidateRefit]()
         for r in base.refits:
-            if subsystem(library[r.name]) not in seen and r not in near:
+            if subsystem(library[r.name]) not in seen:
                 seen.add(subsystem(library[r.name]))
                 others.append(r)
         if not others or not any("." not in key and key in self.priors for key in at_bound):

@@ -11,7 +11,7 @@ function stopped() {
   const took = state.stop?.phase === "done" && state.stop.milliseconds < 2000
     ? ` Acknowledged after ${fixed(state.stop.milliseconds, 0)} ms.` : "";
   return html`<div class="banner stop" role="alert">
-    <span><strong>Emergency stop.</strong> The drive is at 0 V and stays there.${took}
+    <span><strong>${now.stop_reason && now.stop_reason !== "emergency stop" ? "Fault." : "Emergency stop."}</strong> The drive is at 0 V and stays there.${took}
       ${now.stop_reason && now.stop_reason !== "emergency stop" ? html`<span class="soft">${now.stop_reason}</span>` : nothing}</span>
     <button id="reset" ?disabled=${!operates() || now.may_reset === false} @click=${reset}>Reset…</button>
   </div>`;

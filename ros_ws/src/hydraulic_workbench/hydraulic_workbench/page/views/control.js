@@ -12,6 +12,7 @@ let asked = "";
 const pending = new Map();
 const firsts = new Map(); // what a gain was when it was first seen: its slider stays where it is
 let timer = null;
+let asks = 0; // of the controller; an answer that a later question has overtaken is old
 
 async function load() {
   if (!state.controllers && !state.asksForControllers) {
@@ -39,17 +40,19 @@ function set(parameter, value) {
     timer = null;
     const values = Object.fromEntries(pending);
     pending.clear();
-    take(await attempt(() => post("/api/controller/gains", { values })));
+    await ask("/api/controller/gains", { values });
   }, 100);
 }
 
-function take(answer) {
-  if (!answer) return;
+async function ask(path, body) {
+  const mine = ++asks;
+  const answer = await attempt(() => post(path, body));
+  if (!answer || mine !== asks) return;
   if (!answer.ok) say(answer.message || "The controller refused.", "poor");
   if (!pending.size && answer.parameters) update({ gains: { ...state.gains, parameters: answer.parameters } });
 }
 
-const undo = async () => take(await attempt(() => post("/api/controller/undo")));
+const undo = () => ask("/api/controller/undo");
 
 /** Bounds of a slider: the parameter's own, else around its first value. */
 function bounds(parameter) {

@@ -93,7 +93,7 @@ function progress() {
       <span class="chip ${good ? "good" : "poor"}">${now.phase}</span></header>
     <p>${now.text}</p>
     ${record ? html`<p class="row" style="margin-top:10px">
-      <button class="primary" ?disabled=${!operates()} @click=${() => diagnoseRecord(record)}>Diagnose ${record.name}</button>
+      <button class=${good ? "primary" : ""} ?disabled=${!operates()} @click=${() => diagnoseRecord(record)}>Diagnose ${record.name}</button>
       <button @click=${() => { update({ shownRecords: [record.id] }); open("records"); }}>Look at it</button></p>` : nothing}
   </section>`;
 }

@@ -12,7 +12,7 @@ export function locateResult(doc) {
         <tbody>${doc.balances.map((one) => html`<tr><th>${one.title}</th><td class="number"><b>${digits(one.ratio, 3)} × noise</b></td>
           <td class="number">${quantity(one.residual_rms, one.unit, 3)}</td></tr>`)}</tbody></table></div>
       ${attribution.length ? html`<div class="scroll"><table><thead><tr><th>Subsystem</th><th>Explains</th></tr></thead>
-        <tbody>${attribution.map((one) => html`<tr><th>${words(one.subsystem)}</th><td class="share-cell"><span class="share"><span style=${`width:${100 * Math.max(0.01, one.share ?? 0)}%`}></span></span>
+        <tbody>${attribution.map((one) => html`<tr><th>${words(one.name)}</th><td class="share-cell"><span class="share"><span style=${`width:${100 * Math.max(0.01, one.share ?? 0)}%`}></span></span>
           <span>${percent(one.share)}</span></td></tr>`)}</tbody></table></div>` : nothing}
     </div>
     <ul class="findings">${(doc.findings ?? []).map((one) => html`<li>${one.text}</li>`)}</ul></section>`;

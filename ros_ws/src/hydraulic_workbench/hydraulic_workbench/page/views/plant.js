@@ -9,7 +9,7 @@ import { words } from "../core/format.js";
 import { faults, guess } from "./plant_running.js";
 import { hiddenEffects } from "./hidden_effects.js";
 
-const chosen = { model: null, hidden: {}, bus: null, canModel: null, realBus: null, lockstep: false };
+const chosen = { model: null, hidden: {}, bus: null, canModel: null, realBus: null, lockstep: true };
 
 async function load() {
   if (state.choices || state.asksForChoices) return;

@@ -15,12 +15,12 @@ export function faults() {
   const nodes = [...new Set(all.map((fault) => fault.node))];
   return html`<h3 style="margin-top:16px">Faults to provoke</h3>
     <p class="soft small">Each device fails as its real counterpart would. Live shows how the driver reacts.</p>
-    ${nodes.map((node) => html`<div class="row" role="group" aria-label=${`Faults of ${node}`}>
-      <span class="soft small node">${words(node)}</span>
+    ${nodes.map((node) => html`<div class="device" role="group" aria-label=${`Faults of ${node}`}>
+      <span class="soft small">${words(node)}</span><span class="row">
       ${all.filter((fault) => fault.node === node).map((fault) => html`
         <button class="small fault" aria-pressed=${fault.on} title=${fault.title} ?disabled=${!operates()} @click=${() => provoke(fault)}>
           ${words(fault.name)}</button>`)}
-    </div>`)}`;
+    </span></div>`)}`;
 }
 
 let answer = "";
