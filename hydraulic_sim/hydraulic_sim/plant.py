@@ -144,6 +144,20 @@ class Plant:
         """The value in use of a parameter [SI]."""
         return float(self._parameters[self.layout.parameters[key]])
 
+    @property
+    def closes_a_loop(self) -> bool:
+        """Whether a controller inside the actuator follows a commanded position: then the drive is that command."""
+        return any(e.slot == "loop" for e in self._active)
+
+    @property
+    def mass(self) -> float:
+        """All that moves with the piston [kg]: moving_mass and what effects put on."""
+        total = self.value("moving_mass")
+        for e in self._active:
+            if e.slot == "inertia":
+                total += e.kernel(*(self.value(f"{e.name}.{name}") for name in arguments(e.kernel)))
+        return total
+
     def initial_state(
         self,
         position: float = 0.0,
@@ -285,6 +299,8 @@ class Plant:
         Plants of one library with the same path propagate a record to the same inner states.
         """
         inner = self._inner_effects
+        if self.closes_a_loop:
+            return None
         alone = {"command", "t", *PER_SAMPLE}
         for e in inner:
             own = {p.name for p in e.parameters} | {s.name for s in e.states}

@@ -19,11 +19,23 @@ channel in other files of a set, as of a transducer that was moved, ``files`` ha
     files:
       "*_pA_*": {pressure_a: {column: p, unit: MPa}}
       "*_pB_*": {pressure_b: {column: p, unit: MPa}}
+
+What a record states of the machine itself, a load that was put on or a gain that was set, is said under ``settings``,
+by the key of the model's parameter: a number [SI], or a column. Where that changes, another record begins::
+
+    settings:
+      payload.mass: {column: mass, scale: 0.0225}
+      position_loop.active: {column: torque_enable}
+
+A rotary axis is described at a radius of 1 m: an angle (rad, deg) counts as the arc in m, its speed (rad/s) in m/s, a
+torque (N*m) as the force in N. Where the actuator has a position controller of its own the drive is its command: a
+position (m, mm) or an angle counts as so many volts.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -36,6 +48,9 @@ from hydraulic_sysid.data.errors import ColumnMapError
 from hydraulic_sysid.data.records.channels import CHANNELS, TIME, allowed, si_unit
 
 IRREGULAR = ("error", "resample", "split")
+_AT_ONE_METRE = {"m": ("rad",), "m/s": ("rad/s",), "N": ("N*m",), "V": ("m", "rad")}
+"""What counts as a channel's unit too: a rotary axis at a radius of 1 m, and a position that is the command."""
+_ANGLE = re.compile(r"rad|deg|rev|turn")
 
 
 @dataclass(frozen=True)
@@ -81,6 +96,7 @@ class ColumnMap:
     name: str = ""
     notes: Sequence[str] = field(default_factory=tuple)
     files: Mapping[str, Mapping[str, Column]] = field(default_factory=dict)
+    settings: Mapping[str, float | Column] = field(default_factory=dict)
 
     def for_file(self, name: str) -> ColumnMap:
         """The map of a file of this name: with what ``files`` says of it.
@@ -133,7 +149,7 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
 
     :raises ColumnMapError: contents that mean nothing; the text names the key and what is allowed.
     """
-    keys = ("time", "channels", "extra", "records", "files", "header", "delimiter", "decimal", "notes")
+    keys = ("time", "channels", "extra", "records", "files", "settings", "header", "delimiter", "decimal", "notes")
     top = _mapping(document, where, keys)
     if "channels" in top and "records" in top:
         raise ColumnMapError(f"{where}: has both 'channels' and 'records' (several groups of channels); one is allowed")
@@ -181,6 +197,7 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
         where,
         tuple(notes),
         files,
+        _settings(top.get("settings", {}), f"{where}: settings"),
     )
 
 
@@ -246,6 +263,19 @@ def _extra(document: Any, where: str) -> dict[str, Column]:
     return {name: _column(entry, None, f"{where}.{name}") for name, entry in entries.items()}
 
 
+def _settings(document: Any, where: str) -> dict[str, float | Column]:
+    found: dict[str, float | Column] = {}
+    for key, entry in _mapping(document, where).items():
+        if not isinstance(key, str) or not all(part.isidentifier() for part in key.split(".")):
+            raise ColumnMapError(f"{where}: {key!r} is no parameter's key, such as moving_mass or payload.mass")
+        if isinstance(entry, Mapping):
+            _mapping(entry, f"{where}.{key}", ("column", "sign", "scale", "offset"))
+            found[key] = _column({**entry, "unit": "1"}, None, f"{where}.{key}")
+        else:
+            found[key] = _number(entry, f"{where}.{key}")
+    return found
+
+
 def _column(document: Any, quantity: str | None, where: str) -> Column:
     entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset"))
     if "column" not in entry:
@@ -271,16 +301,21 @@ def _si_factors(unit: str, quantity: str, where: str) -> tuple[float, float]:
     wanted = si_unit(quantity)
     if unit == wanted:
         return 1.0, 0.0
+    plain = unit.replace("_per_", "/").replace("_", " ")
     # Loaded only where a unit is to be converted: pint takes a good part of a second.
     from hydraulic_sim.errors import ModelError
     from hydraulic_sim.units import conversion
 
     if not unit.strip():
         raise ColumnMapError(f"{where}: no unit; expected one that converts to {wanted}")
-    try:
-        return conversion(unit.replace("_per_", "/").replace("_", " "), wanted)
-    except ModelError:
-        raise ColumnMapError(f"{where}: unit {unit!r} does not convert to {wanted}") from None
+    for meant in (wanted, *_AT_ONE_METRE.get(wanted, ())):
+        if meant.startswith("rad") and _ANGLE.search(plain) is None:  # a plain number is no angle
+            continue
+        try:
+            return conversion(plain, meant)
+        except ModelError:
+            continue
+    raise ColumnMapError(f"{where}: unit {unit!r} does not convert to {wanted}")
 
 
 def _mapping(document: Any, where: str, keys: Sequence[str] | None = None) -> Mapping[str, Any]:

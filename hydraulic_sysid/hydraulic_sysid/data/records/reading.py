@@ -31,7 +31,10 @@ def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None
     if not path.exists():
         raise FileError(path, "does not exist")
     if path.is_dir() and not _is_bag(path):
-        entries = [entry for entry in sorted(path.iterdir()) if _holds_record(entry)]
+        # Results are kept as JSON, too: a log of that kind is looked for only where a column map says what it holds.
+        entries = [
+            entry for entry in sorted(path.iterdir()) if _holds_record(entry) and (mapping or entry.suffix != ".json")
+        ]
         if not entries:
             raise FileError(path, "holds no records", expected=_kinds())
         return [record for entry in entries for record in _read(entry, mapping)]

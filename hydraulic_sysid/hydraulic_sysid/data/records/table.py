@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -78,21 +79,56 @@ def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list
         notes += [n for n in table.description.get("notes", ()) if isinstance(n, str)]
         description: dict[str, Any] = {**kept, **({"columns": columns.name} if columns.name else {})}
         drive_from_command(channels, notes)
+        given = {key: _setting(table, value) for key, value in columns.settings.items()}
         sizes = {values.size for values in channels.values()}
         if columns.dt is not None:
             if len(sizes) != 1 or min(sizes) < 2:
                 raise FileError(table.path, f"columns have {sorted(sizes)} samples", expected="equal lengths ≥ 2")
             description["notes"] = notes
-            records.append(Record.sampled(title, columns.dt, channels, table.path, description, columns.units))
+            for number, (first, last, own) in enumerate(pieces := _constant(given, min(sizes)), 1):
+                stretch = {name: values[first:last] for name, values in channels.items()}
+                whole = description | own
+                label = f"{title}.{number}" if len(pieces) > 1 else title
+                records.append(Record.sampled(label, columns.dt, stretch, table.path, whole, columns.units))
             continue
         assert columns.time is not None
         time = _finite(table, columns.time)
         if sizes != {time.size} or time.size < 2:
             problem = f"channels have {sorted(sizes)} samples, the time {time.size}"
             raise FileError(table.path, problem, expected="equal lengths, at least 2")
-        samples = Samples(table.path, time, channels, table.row, table.label(columns.time.column), columns.units)
-        records += evenly_sampled(samples, columns.irregular, title, notes, description)
+        place = table.label(columns.time.column)
+        for number, (first, last, own) in enumerate(pieces := _constant(given, time.size), 1):
+            stretch = {name: values[first:last] for name, values in channels.items()}
+            row = partial(_row, table, first)
+            samples = Samples(table.path, time[first:last], stretch, row, place, columns.units)
+            label = f"{title}.{number}" if len(pieces) > 1 else title
+            records += evenly_sampled(samples, columns.irregular, label, notes, description | own)
     return records
+
+
+def _row(table: Table, first: int, index: int) -> int:
+    return table.row(first + index)
+
+
+def _setting(table: Table, value: float | Column) -> float | Array:
+    return _finite(table, value) if isinstance(value, Column) else value
+
+
+def _constant(given: Mapping[str, float | Array], count: int) -> list[tuple[int, int, dict[str, Any]]]:
+    """Stretches of samples over which all settings stay, and what a description says of them there."""
+    if not given:
+        return [(0, count, {})]
+    varying = [values for values in given.values() if isinstance(values, np.ndarray)]
+    changes = np.zeros(max(count - 1, 0), dtype=bool)
+    for values in varying:
+        changes |= np.diff(values) != 0.0
+    bounds = [0, *(np.flatnonzero(changes) + 1).tolist(), count]
+    found = []
+    for first, last in zip(bounds, bounds[1:], strict=False):
+        if last - first > 1:
+            own = {key: float(v[first]) if isinstance(v, np.ndarray) else v for key, v in given.items()}
+            found.append((first, last, {"settings": own}))
+    return found
 
 
 def evenly_sampled(
