@@ -11,6 +11,8 @@ A map is a YAML file::
     extra:
       speed_signal: {column: 4, unit: V} # a channel of its own, for which no SI unit is known
     header: false                        # header, delimiter and decimal are found out where they are left out
+    skip: 6                              # lines of a text file before its table
+    ragged: true                         # rows may have more or fewer cells than the header (marks of a logger)
     notes: Where the numbers come from.
 
 ``records: {left: {…}, right: {…}}`` in place of ``channels`` makes several records of one file. A map with neither
@@ -93,7 +95,8 @@ class ColumnMap:
     ``units`` are those of the channels that are not in `CHANNELS`. Either ``time`` is a column or ``dt`` is the
     period in seconds. ``irregular`` says what to do with stamps that are not even: refuse them, resample
     (interpolate on the even grid) or split into several records. ``header``: None looks for itself; ``delimiter``
-    and ``decimal`` too. ``files``: what files of such a name have besides, by pattern; see `for_file`.
+    and ``decimal`` too. ``files``: what files of such a name have besides, by pattern; see `for_file`. Of a text file
+    ``skip`` lines are left out, and rows of a ``ragged`` one differ in length.
     """
 
     parts: Mapping[str, Mapping[str, Column]]
@@ -110,6 +113,8 @@ class ColumnMap:
     settings: Mapping[str, float | Column] = field(default_factory=dict)
     step: float | None = None
     """Period [s] to resample to, where it is not the median of the stamps'."""
+    skip: int = 0
+    ragged: bool = False
 
     @property
     def several_files(self) -> bool:
@@ -167,7 +172,8 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
 
     :raises ColumnMapError: contents that mean nothing; the text names the key and what is allowed.
     """
-    keys = ("time", "channels", "extra", "records", "files", "settings", "header", "delimiter", "decimal", "notes")
+    keys = ("time", "channels", "extra", "records", "files", "settings", "header", "delimiter", "decimal",
+            "skip", "ragged", "notes")  # fmt: skip
     top = _mapping(document, where, keys)
     if "channels" in top and "records" in top:
         raise ColumnMapError(f"{where}: has both 'channels' and 'records' (several groups of channels); one is allowed")
@@ -221,6 +227,8 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
         files,
         _settings(top.get("settings", {}), f"{where}: settings"),
         step,
+        skip=_count(top.get("skip", 0), f"{where}: skip"),
+        ragged=_choice(top.get("ragged", False), f"{where}: ragged", (True, False)),
     )
 
 
@@ -362,6 +370,12 @@ def _number(value: Any, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise ColumnMapError(f"{where} is {value!r}, must be a finite number")
     return float(value)
+
+
+def _count(value: Any, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ColumnMapError(f"{where} is {value!r}, must be a number of lines, 0 or more")
+    return value
 
 
 def _choice(value: Any, where: str, choices: Sequence[Any]) -> Any:

@@ -20,7 +20,7 @@ from hydraulic_sysid.data.records.channels import TIME_UNIT
 from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header, named_columns
 from hydraulic_sysid.data.records.record import Record
 
-SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz")
+SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz")
 _ELEMENT = re.compile(r"(.+)\[([1-9]\d*)\]")  # of a column whose cells are lists
 _GZIP_MAGIC = b"\x1f\x8b"
 
@@ -51,7 +51,8 @@ class CsvTable:
         self.path = path
         self.description: Mapping[str, Any] = {}
         lines = _text(path).splitlines()
-        rows = [number for number, line in enumerate(lines, 1) if line and not line.isspace()]
+        skip = columns.skip if columns else 0
+        rows = [number for number, line in enumerate(lines, 1) if number > skip and line and not line.isspace()]
         if len(rows) != len(lines):
             lines = [lines[number - 1] for number in rows]
         # A comment of '#' lines may stand before the table.
@@ -74,7 +75,8 @@ class CsvTable:
             raise FileError(path, f"{len(lines)} rows of numbers", expected="at least two")
         self._rows, self._lines = rows, lines
         self.width = len(cells)
-        self._check_ragged()
+        if not (columns and columns.ragged):
+            self._check_ragged()
         decimal = columns.decimal if columns else None
         if decimal is None:
             commas = self._delimiter != "," and any("," in line for line in lines)

@@ -31,9 +31,11 @@ def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None
     if not path.exists():
         raise FileError(path, "does not exist")
     if path.is_dir() and not _is_bag(path):
-        # Results are kept as JSON, too: a log of that kind is looked for only where a column map says what it holds.
+        # Results are kept as JSON, and notes as text: such are records only where a column map says what they hold.
         entries = [
-            entry for entry in sorted(path.iterdir()) if _holds_record(entry) and (mapping or entry.suffix != ".json")
+            entry
+            for entry in sorted(path.iterdir())
+            if _holds_record(entry) and (mapping or entry.suffix not in (".json", ".txt"))
         ]
         if not entries:
             raise FileError(path, "holds no records", expected=_kinds())
