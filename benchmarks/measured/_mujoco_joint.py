@@ -85,9 +85,7 @@ def main() -> None:
 
     start = parameters(spec)
     fit, test = ([n for n in names if n.startswith(role)] for role in ("fit", "test"))
-    done, result = sysid.optimize(
-        start, sysid.build_residual_fn(models_sequences=[sequences(fit)]), verbose=False
-    )
+    done, result = sysid.optimize(start, sysid.build_residual_fn(models_sequences=[sequences(fit)]), verbose=False)
     errors = {}
     for n in fit + test:
         fn = sysid.build_residual_fn(models_sequences=[sequences([n])], return_pred_all=True)

@@ -74,7 +74,9 @@ def test_named_records_are_for_validation_whole(model) -> None:
 
 def test_candidates_are_the_library_without_what_is_on_or_cannot_act(model) -> None:
     names = {e.name for e in candidates(model)}
-    assert names == {e.name for e in model.library.values() if not e.always_on} - set(model.effects)
+    acting = {e.name for e in model.library.values() if "hydraulic" in e.kinds and e.searched and not e.always_on}
+    assert names == acting - set(model.effects)
+    assert "load_dependent_friction" not in names and "payload" not in names
     assert not {"supply_droop"} & {e.name for e in candidates(model.with_effect("supply_droop"))}
 
 
