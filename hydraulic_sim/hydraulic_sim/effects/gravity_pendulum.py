@@ -1,6 +1,6 @@
 """Gravity on an arm: a weight that hangs at an axis pulls it down.
 
-    F = −T·sin(x + φ)      (x: angle, at a radius of 1 m; T = m·g·l)
+    F = −T·sin(x − x0)      (x: angle, at a radius of 1 m; T = m·g·l)
 
 Source: Goldstein, Poole & Safko (2002), Classical Mechanics, 3rd ed., ch. 1 (plane pendulum).
 """
@@ -19,9 +19,9 @@ EFFECT = Effect(
     summary="weight of an arm that turns about a horizontal axis",
     kernel=force,
     parameters=(
-        Parameter("weight", "N", 0.5, (-1e4, 1e4), "moment m*g*l of the weight, at a radius of 1 m",
+        Parameter("weight", "N", 0.5, (0.0, 1e4), "moment m*g*l of the weight, at a radius of 1 m",
                   "mass and length of the arm", null=0.0),
-        Parameter("hanging", "m", 0.0, (-7.0, 7.0), "angle at which it hangs at rest, at a radius of 1 m",
+        Parameter("hanging", "rad", 0.0, (-7.0, 7.0), "angle at which it hangs at rest",
                   "zero of the position sensor"),
     ),
     equation="F = -T*sin(x - x0)",
