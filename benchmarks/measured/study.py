@@ -4,7 +4,7 @@ A study is a module of this package with
 
 - ``SOURCE``: a `Source`, where the data are published and under which licence;
 - ``EXCERPT``: the folder of `data` that is shipped and that CI diagnoses, or None where the licence allows none;
-- ``study(data, work)``: takes the folder of the data and a `Work`, returns a `Row`.
+- ``study(data, work)``: takes the folder of the data and a `Work`, returns a `Row` for each machine or joint.
 
 Column maps are those of `hydraulic_sysid/data/columns`, model files those of `models`: a user has the same.
 """
@@ -21,7 +21,14 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hydraulic_interfaces.errors import HydraulicError
+from hydraulic_sim.arrays import Array
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
 
 HERE = Path(__file__).parent
 DATA, MODELS = HERE / "data", HERE / "models"
@@ -68,7 +75,6 @@ class Row:
     known: str
     """What is known of the machine, and how the verdict was held against it."""
     checks: Sequence[Check] = ()
-    seconds: dict[str, float] = field(default_factory=dict)
 
     @property
     def good(self) -> bool:
@@ -82,7 +88,6 @@ class Row:
             f"evidence: {self.evidence}",
             f"known: {self.known}",
             *(f"{'holds' if c.holds else 'DOES NOT HOLD'}: {c.text}" for c in self.checks),
-            "seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in self.seconds.items()),
         ]
 
 
@@ -91,6 +96,8 @@ class Work:
     """The folder of a study's results, and how verbs are run into it."""
 
     folder: Path
+    quick: bool = False
+    """Without what takes minutes: long searches, and all of a set beyond one machine."""
     say: Callable[[str], None] = print
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -111,9 +118,68 @@ class Work:
         document: dict[str, Any] = json.loads((out / f"{verb}.json").read_text("utf-8"))
         return document
 
-    def keep(self, row: Row) -> None:
-        """Write the row beside the results."""
-        (self.folder / "row.json").write_text(json.dumps(asdict(row), indent=1, ensure_ascii=False), "utf-8")
+    def keep(self, rows: Sequence[Row]) -> None:
+        """Write the rows beside the results."""
+        text = json.dumps([asdict(row) for row in rows], indent=1, ensure_ascii=False)
+        (self.folder / "rows.json").write_text(text, "utf-8")
+
+    def picture(self, name: str, series: Sequence[tuple[str, Array, dict[str, Array]]], unit: str) -> Path:
+        """A PNG with a panel for each of ``series``: its title, the time (N,) [s] and curves (N,) by their labels.
+
+        The first curve is what was measured; below each panel stands what the others are off from it.
+        """
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(5.2 * len(series), 5.2), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(2, len(series), sharex="col", squeeze=False, height_ratios=(3, 2))
+        for (title, at, curves), above, below in zip(series, *axes, strict=True):
+            measured = next(iter(curves.values()))
+            for k, (label, values) in enumerate(curves.items()):
+                colour = ("black", "tab:orange", "tab:blue")[k]
+                above.plot(at, values, color=colour, linewidth=1.2, label=label)
+                if k:
+                    below.plot(at, values - measured, color=colour, linewidth=1.0)
+            above.set_title(title, fontsize=10)
+            above.set_ylabel(unit)
+            above.legend(fontsize=8)
+            below.set_ylabel(f"error, {unit}")
+            below.set_xlabel("s")
+            for ax in (above, below):
+                ax.grid(alpha=0.3)
+        path = self.folder / f"measured_{name}.png"
+        figure.savefig(path, dpi=100)
+        return path
+
+
+def free_run(model: Model, record: Record) -> Array:
+    """Position (N,) [m] of a run over the whole record, from its first sample; NaN where the model cannot run."""
+    plant = Plant(model)
+    try:
+        first = plant.initial_state(position=float(record["position"][0]), drive=float(record["drive"][0]))
+        return plant.simulate(record["drive"], record.dt, first).position
+    except SimulationError:
+        return np.full(len(record), np.nan)
+
+
+def rms(values: Array) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def said(document: dict[str, Any]) -> tuple[str, str]:
+    """Verdict and evidence of a diagnosis, in a few words each."""
+    verdict, residual = document["verdict"], document["residual"]
+    named = [str(name) for name in verdict["effects"]]
+    faults = [str(fault["name"]) for fault in document["recording"]["faults"]]
+    data = [str(datum["key"]) for datum in document["data_sheet"]]
+    what = ", ".join(named + faults + data)
+    kind = str(verdict["kind"])
+    if kind == "outside the library" and what:
+        what = f"nearest {what}"
+    before, after = (residual[when]["validation"] for when in ("before", "after"))
+    return f"{kind}: {what}" if what else kind, f"{before:.3g} → {after:.3g} × noise on validation data"
 
 
 def data_folder(source: Source, given: Path, into: Path) -> Path:
