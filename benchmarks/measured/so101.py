@@ -21,7 +21,7 @@ from hydraulic_sysid.estimation.fit import FitSettings
 from measured.study import DATA, MODELS, Check, Row, Source, Work, free_run, rms, said
 
 SOURCE = Source(
-    "https://github.com/isaac-sim2real/sage", "main", "multisine/control.csv", "Apache-2.0",
+    "https://github.com/isaac-sim2real/sage", "4ffd2627df9d23e279b35712a67e629ce0c0dfa7", "multisine/control.csv", "Apache-2.0",
     "SAGE, output/real/so101: 50 motions of an SO-101 arm, 50 Hz",
 )  # fmt: skip
 EXCERPT = DATA / "so101"
