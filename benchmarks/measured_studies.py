@@ -1,6 +1,6 @@
 """Measured data of real machines: compare, diagnose, add, and the error on data that nothing has seen.
 
-    ./bench shell -- python benchmarks/measured_studies.py SET [FOLDER] [--fetch] [--quick] [--out DIR]
+    ./bench shell -- python benchmarks/measured_studies.py SET [FOLDER] [--fetch] [--quick] [--machine NAME] [--out DIR]
 
 Each SET is a module of `benchmarks/measured`. FOLDER holds the data as they are published (or the archive of them);
 without it the excerpt that is shipped is studied, and --fetch clones the repository that publishes them. Prints the
@@ -37,13 +37,14 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("folder", nargs="?", type=Path)
     parser.add_argument("--fetch", action="store_true", help="clone the repository that publishes the data")
     parser.add_argument("--quick", action="store_true", help="one machine of the set, without long searches, as in CI")
+    parser.add_argument("--machine", help="of a set with several machines or joints this one alone")
     parser.add_argument("--out", type=Path, help="folder of the results, a new one")
     options = parser.parse_args(argv)
     study = every[options.set]
     out: Path = options.out or Path("runs/measured") / options.set
     try:
         out.mkdir(parents=True, exist_ok=True)
-        work = Work(out, options.quick)
+        work = Work(out, options.quick, options.machine)
         if options.folder is None and not options.fetch and study.EXCERPT is None:
             raise StudyError(f"{options.set}: no data are shipped; {where(study.SOURCE)}")
         given = fetched(study.SOURCE, out) if options.fetch else options.folder or study.EXCERPT

@@ -31,6 +31,7 @@ SOURCE = Source(
     "Actuators (2024); logs at af22604 and b53408c, and rimim/bam at 38071b1",
 )  # fmt: skip
 EXCERPT = DATA / "bam"
+QUICK = "sts3250"
 SEGMENT, TRIED, WORTH, TRIALS = 1.5, 5, 0.98, 250
 KNOWN = {
     "xl330": "a gear, whose friction depends on its load (BAM); a supply that sags is a guess of the data",
@@ -84,6 +85,8 @@ def study(data: Path, work: Work) -> list[Row]:
     """A row for each motor whose logs are there; the others are named."""
     rows = []
     for name, motor in MOTORS.items():
+        if not work.wanted(name, QUICK):
+            continue
         where = folder(data, motor)
         if where is None:
             work.say(f"{name}: no {motor.folder} under {data}: not studied")

@@ -48,7 +48,7 @@ def study(data: Path, work: Work) -> list[Row]:
     folder = next(data.rglob(SOURCE.files)).parent.parent
     rows = []
     for joint, known in JOINTS.items():
-        if work.quick and joint != QUICK:
+        if not work.wanted(joint, QUICK):
             continue
         fit = [motion(folder, name, joint) for name in FIT]
         test = [motion(folder, name, joint) for name in TEST]
@@ -58,7 +58,7 @@ def study(data: Path, work: Work) -> list[Row]:
             words = ["--model", MODELS / "so101.yaml", "--record", *(folder / n / "control.csv" for n in FIT)]
             words += ["--columns", f"so101_{joint}", "--window", 0, SECONDS, "--segment", SEGMENT]
             work.verb("compare", *words[:-2], into=f"{joint}_compared")
-            found = work.verb("diagnose", *words, "--within", 60, into=f"{joint}_diagnosed")
+            found = work.verb("diagnose", *words, "--within", 200, into=f"{joint}_diagnosed")
             verdict, evidence = said(found)
             named = found["verdict"]["effects"][0] if found["verdict"]["effects"] else None
         before = fitted(bare, fit)

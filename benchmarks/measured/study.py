@@ -98,6 +98,8 @@ class Work:
     folder: Path
     quick: bool = False
     """Without what takes minutes: long searches, and all of a set beyond one machine."""
+    machine: str | None = None
+    """Of a set with several machines this one alone."""
     say: Callable[[str], None] = print
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -122,6 +124,10 @@ class Work:
         """Write the rows beside the results."""
         text = json.dumps([asdict(row) for row in rows], indent=1, ensure_ascii=False)
         (self.folder / "rows.json").write_text(text, "utf-8")
+
+    def wanted(self, machine: str, quick: str) -> bool:
+        """Whether a machine of a set is to be studied; ``quick`` is the one of a quick study."""
+        return machine == (self.machine or (quick if self.quick else machine))
 
     def picture(self, name: str, series: Sequence[tuple[str, Array, dict[str, Array]]], unit: str) -> Path:
         """A PNG with a panel for each of ``series``: its title, the time (N,) [s] and curves (N,) by their labels.
