@@ -17,11 +17,11 @@ import numpy as np
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_sim.plant import Plant
-from measured._bam import MODELS as FRICTION
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.diagnosis.calibrate import calibrate
 from hydraulic_sysid.estimation.fit import FitSettings
 from measured._bam import DT, Log, bounds, maes, our_maes, our_rollout, polished, read_logs
+from measured._bam import MODELS as FRICTION
 from measured._bam_motors import MOTORS, Motor
 from measured.study import DATA, MODELS, Check, Row, Source, StudyError, Work, said
 
@@ -132,8 +132,8 @@ def _row(where: Path, motor: Motor, work: Work) -> Row:
         motor.title, verdict, evidence, "MAE of position by BAM's measure, test logs [mrad]",
         float(errors["before"]["test"].mean()), mine,
         ", ".join(f"{m} {e:.1f} ({len(bounds(motor.name, m))})" for m, e in theirs.items()),
-        f"{KNOWN[motor.name]}; {motor.split}; added {', '.join(added) or 'nothing'}; {free} free parameters; on the logs "
-        f"for fitting {errors['after']['fit'].mean():.1f}, on all {whole:.1f} mrad",
+        f"{KNOWN[motor.name]}; {motor.split}; added {', '.join(added) or 'nothing'}; {free} free parameters; on the "
+        f"logs for fitting {errors['after']['fit'].mean():.1f}, on all {whole:.1f} mrad",
         [Check(f"{motor.name}: {mine:.1f} ≤ m6's {theirs['m6']:.1f} mrad", bool(mine <= theirs["m6"])),
          Check(f"{motor.name}: {free} < {len(bounds(motor.name, 'm6'))} parameters of m6",
                free < len(bounds(motor.name, "m6")))],

@@ -1,8 +1,8 @@
 """MTS servo-hydraulic machine in position control against an MR damper: lag and dead time of the machine's own loop.
 
-The plant is its commanded position and what the displacement makes of it: a lag of order 1, to which `diagnose` may add.
-A sweep of 1.4 mm from 0.2 to 20 Hz without current is fitted at 11 to 14 Hz; test data are the sweep with 1 A at the same
-frequencies, which nothing else reads. Beside the verdict stands the frequency response, read from the records by hand.
+The plant is a lag of order 1 between commanded and measured position, to which `diagnose` may add. A sweep of 1.4 mm
+from 0.2 to 20 Hz without current is fitted at 11 to 14 Hz; test data are the sweep with 1 A there, which
+nothing else reads. Beside the verdict stands the frequency response, read from the records by hand.
 """
 
 from __future__ import annotations
@@ -83,7 +83,8 @@ def study(data: Path, work: Work) -> list[Row]:
         f"{1e3 * fitted_lag:.1f} ms, dead time {1e3 * delay:.2f} ms; what the valve is, is not known",
         [Check(f"command_delay is named or not distinguishable from what is: {named}, {sorted(instead)}",
                "command_delay" in {*named, *instead}),
-         Check(f"dead time {1e3 * delay:.2f} ms within 1.5 ms of {1e3 * dead:.2f} ms by hand", abs(delay - dead) < 1.5e-3),
+         Check(f"dead time {1e3 * delay:.2f} ms within 1.5 ms of {1e3 * dead:.2f} ms by hand",
+               abs(delay - dead) < 1.5e-3),
          Check(f"{before:.4f} → {after:.4f} mm: falls by a quarter or more", after < 0.75 * before)],
     )]  # fmt: skip
 

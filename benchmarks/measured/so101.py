@@ -21,8 +21,8 @@ from hydraulic_sysid.estimation.fit import FitSettings
 from measured.study import DATA, MODELS, Check, Row, Source, Work, free_run, rms, said
 
 SOURCE = Source(
-    "https://github.com/isaac-sim2real/sage", "4ffd2627df9d23e279b35712a67e629ce0c0dfa7", "multisine/control.csv", "Apache-2.0",
-    "SAGE, output/real/so101: 50 motions of an SO-101 arm, 50 Hz",
+    "https://github.com/isaac-sim2real/sage", "4ffd2627df9d23e279b35712a67e629ce0c0dfa7", "multisine/control.csv",
+    "Apache-2.0", "SAGE, output/real/so101: 50 motions of an SO-101 arm, 50 Hz",
 )  # fmt: skip
 EXCERPT = DATA / "so101"
 FIT = ("multisine", "friction_gravity", "backlash_detection")
@@ -77,8 +77,9 @@ def study(data: Path, work: Work) -> list[Row]:
         rows.append(Row(
             f"SO-101 {joint}", verdict, evidence, "RMSE of position in free run, mean of 3 test motions [mrad]",
             mean["before"], mean["after"], f"mujoco[sysid] {own['version']}: {theirs:.1f} ({own['free']} parameters)",
-            f"{'an arm that gravity pulls' if known else 'a vertical axis, no gravity'}; {free} free parameters; each "
-            f"test motion: {', '.join(f'{n} {e:.1f}' for n, e in zip(TEST, errors['after'], strict=True))} mrad", checks,
+            f"{'an arm that gravity pulls' if known else 'a vertical axis, no gravity'}; {free} free parameters; "
+            f"each test motion: {', '.join(f'{n} {e:.1f}' for n, e in zip(TEST, errors['after'], strict=True))} mrad",
+            checks,
         ))  # fmt: skip
         panels = [
             (f"{joint}, {name}", r.time, {"measured": r["position"], **{k: v[i] for k, v in runs.items()}})
