@@ -32,7 +32,7 @@ SOURCE = Source(
 )  # fmt: skip
 EXCERPT = DATA / "bam"
 QUICK = "sts3250"
-SEGMENT, TRIED, WORTH, TRIALS = 1.5, 5, 0.98, 250
+SEGMENT, TRIED, WORTH, TRIALS = 1.5, 4, 0.98, 100
 KNOWN = {
     "xl330": "a gear, whose friction depends on its load (BAM); a supply that sags is a guess of the data",
     "sts3250": "logged every 20 ms while the goal moves on between: named as a fault of the recording",
