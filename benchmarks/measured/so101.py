@@ -27,7 +27,7 @@ SOURCE = Source(
 EXCERPT = DATA / "so101"
 FIT = ("multisine", "friction_gravity", "backlash_detection")
 TEST = ("chirp_sweep", "step_response", "random_waypoints")
-SECONDS, SEGMENT = 40.0, 1.5
+SECONDS, QUICK_SECONDS, SEGMENT = 40.0, 15.0, 1.5
 QUICK = "elbow"
 JOINTS = {"pitch": "gravity_pendulum", "elbow": "gravity_pendulum", "rotation": None}
 """Joint → what is known of it: the weight of an arm; the axis of the rotation is vertical."""
@@ -44,13 +44,15 @@ def fitted(model: Model, records: list[Record]) -> Model:
 
 
 def study(data: Path, work: Work) -> list[Row]:
-    """Each joint; quickly the elbow alone, with what is known of it in place of a search."""
+    """Each joint; quickly the elbow alone, fitted to 15 s of two motions, what is known of it in place of a search."""
     folder = next(data.rglob(SOURCE.files)).parent.parent
     rows = []
     for joint, known in JOINTS.items():
         if not work.wanted(joint, QUICK):
             continue
         fit = [motion(folder, name, joint) for name in FIT]
+        if work.quick:
+            fit = [record.window(0.0, QUICK_SECONDS) for record in fit[:2]]
         test = [motion(folder, name, joint) for name in TEST]
         bare = load_model(MODELS / "so101.yaml")
         verdict, evidence, named = "not searched", "the structure is given", known
