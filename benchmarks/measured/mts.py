@@ -62,7 +62,7 @@ def study(data: Path, work: Work) -> list[Row]:
     words = ["--model", path, "--record", folder / "0A.txt", "--columns", COLUMNS, "--window", *window]
     if not work.quick:
         work.verb("compare", *words, into="compared")
-    found = work.verb("diagnose", *words, "--segment", SEGMENT, "--within", 150, "--apply", into="diagnosed")
+    found = work.verb("diagnose", *words, "--segment", SEGMENT, "--within", 280, "--apply", into="diagnosed")
     verdict, evidence = said(found)
     named = list(found["verdict"]["effects"])
     instead = {c["name"] for name in named for c in found["competing_models"].get(name, []) if not c["distinguishable"]}

@@ -2,7 +2,7 @@
 
 The friction is read by hand from two runs of one command, of which one has pressure A and the other pressure B:
 p_A·A_A − p_B·A_B, the mean over the middle of the stroke, where the speed is steady. The records have no licence:
-nothing of them is shipped. Fitted are runs 3 at 1 and 5 V; test data are runs 6 at 2 and 4 V, in free run over mid stroke.
+nothing of them is shipped. Fitted are runs 3 at 1 and 5 V; test data are runs 6 at 2 and 4 V, run over mid stroke.
 """
 
 from __future__ import annotations
