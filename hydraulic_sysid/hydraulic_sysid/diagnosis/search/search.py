@@ -55,6 +55,7 @@ from .worth import (
     FURTHER,
     MOSTLY,
     NOTHING_LEFT,
+    PROMISES,
     Enough,
     anything,
     decisive,
@@ -121,6 +122,7 @@ class Search:
         self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
         """… and the state that candidates were refitted on last, with these refits."""
         self.as_recorded: SearchState | None = None
+        self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
         self.priors = priors(model)
         self._first = replace(settings, least_gain=FIRST_GAIN)
         self._few = replace(settings, most_steps=FEW_STEPS, least_gain=FEW_GAIN)
@@ -163,7 +165,7 @@ class Search:
 
     def loose(self, strict: SearchState) -> SearchState | None:
         """A state with the data sheet relaxed, where that helps."""
-        if strict.misfit.variance - 1.0 < NOTHING_LEFT or not self._strict(strict):
+        if not self._strict(strict) or self.nothing_left(strict):
             return None
         self.say("fitting the model within the tolerances of its data sheet")
         at_bound = strict.linearisation.parameters.at_bound
@@ -216,7 +218,7 @@ class Search:
 
     def recorded(self, base: SearchState) -> SearchState:
         """A state with its candidates explored, and with every fault of the recording that explains more than they."""
-        while base.misfit.variance - 1.0 > NOTHING_LEFT:
+        while not self.nothing_left(base):
             self.path = [base]
             base = self.explore(base)
             left = remainders(self.split, base.residual)
@@ -246,6 +248,24 @@ class Search:
             self.split, self.path = found.split, [found.state]
             base = self.loosened(self.judged(found.state))
         return base if base.scores else self.rounded(base)
+
+    def nothing_left(self, state: SearchState) -> bool:
+        """Whether a model leaves the noise alone, and no candidate promises to take anything off it.
+
+        A noise estimated from what the model leaves has the small effects that it lacks in it.
+        """
+        if state.misfit.variance - 1.0 >= NOTHING_LEFT:
+            return False
+        self.say("looking for what may pass for noise")
+        least = PROMISES * state.misfit.least
+        return not any(s.reduction > least and not observed(s.effect) for s in self.scores(state))
+
+    def scores(self, state: SearchState) -> list[CandidateScore]:
+        """All candidates on a state, the best first."""
+        at = state.linearisation
+        if self._scored is None or self._scored[0] is not at:
+            self._scored = at, score(at, candidates(state.model), record_features(at))
+        return self._scored[1]
 
     def within_a_sample(self, tried: CandidateRefit) -> bool:
         """Whether an effect only delays, by less than a sampling interval: sound sensors and loggers do so, too."""
@@ -440,7 +460,7 @@ class Search:
     def explore(self, base: SearchState, most: int = MOST_REFITS) -> SearchState:
         """Score all candidates on a state and refit the best."""
         at = base.linearisation
-        scores = score(at, candidates(base.model), record_features(at))
+        scores = self.scores(base)
         if not scores:
             return base
         least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)

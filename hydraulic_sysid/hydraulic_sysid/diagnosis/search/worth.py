@@ -17,7 +17,8 @@ SUBORDINATE = 0.1  # of all that was explained, below which a further effect mus
 LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
 ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
-NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing more is looked for
+NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing more is looked for, …
+PROMISES = 3.0  # … unless a candidate promises to take off so many times the least reduction that counts
 EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
 MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
 ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
@@ -100,13 +101,12 @@ def anything(name: str, after: Misfit, part: float) -> bool:
 
 def leaves_most(before: Misfit, after: Misfit) -> bool:
     """Whether so little was left before that nothing need be missing, and much of that still is."""
-    return before.little and after.variance - 1.0 > SMALL_UNEXPLAINED * (before.variance - 1.0)
+    return before.little and after.variance - 1.0 > max(SMALL_UNEXPLAINED * (before.variance - 1.0), NOTHING_LEFT)
 
 
 def nothing_gained(before: Misfit, after: Misfit) -> bool:
     """Whether nothing was left before, and effects take nothing off what noise leaves."""
-    gained = before.rms_validation**2 - after.rms_validation**2
-    return before.variance - 1.0 < NOTHING_LEFT and gained < NOTHING_LEFT
+    return before.variance - 1.0 < NOTHING_LEFT and before.total - after.total < PROMISES * before.least
 
 
 def decisive(found: SearchResult) -> SearchResult:

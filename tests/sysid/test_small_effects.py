@@ -1,0 +1,44 @@
+"""What is so small that a noise estimated from the residual has it in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hydraulic_sim.model import Model
+from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.search.search import Search
+from hydraulic_sysid.diagnosis.search.worth import NOTHING_LEFT
+from hydraulic_sysid.estimation.fit import FitSettings
+
+DT, SECONDS = 1e-3, 12.0
+RISE = 14.0  # N
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return load_model("sample_bench")
+
+
+def search(model: Model, plant: Model) -> Search:
+    """On a record of ``plant``: slow sines with noise of 3 µm and 2 kPa."""
+    rng = np.random.default_rng(11)
+    t = DT * np.arange(round(SECONDS / DT))
+    drive = 1.2 * np.sin(2.0 * np.pi * 0.4 * t) + 0.8 * np.sin(2.0 * np.pi * 1.3 * t)
+    run = Plant(plant).simulate(drive, DT)
+    noise = {"position": 3e-6, "pressure_a": 2e3, "pressure_b": 2e3}
+    channels = {c: np.asarray(getattr(run, c)) + rng.normal(0.0, s, t.size) for c, s in noise.items()}
+    return Search.of(model, [Record("sines", t, DT, {"drive": drive, **channels})], [], FitSettings(), lambda _: None)
+
+
+@pytest.mark.parametrize(("hidden", "nothing"), [({}, True), ({"stribeck_friction": {"rise": RISE}}, False)])
+def test_what_passes_for_noise_is_still_promised_by_its_effect(model: Model, hidden: dict, nothing: bool) -> None:
+    plant = model
+    for name, values in hidden.items():
+        plant = plant.with_effect(name, values)
+    looked = search(model, plant)
+    base = looked.judged(looked.state(looked.given))
+    assert base.misfit.variance - 1.0 < NOTHING_LEFT, "by the noise alone nothing is left of either"
+    assert looked.nothing_left(base) is nothing
