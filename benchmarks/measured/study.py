@@ -129,7 +129,9 @@ class Work:
         """Whether a machine of a set is to be studied; ``quick`` is the one of a quick study."""
         return machine == (self.machine or (quick if self.quick else machine))
 
-    def picture(self, name: str, series: Sequence[tuple[str, Array, dict[str, Array]]], unit: str) -> Path:
+    def picture(
+        self, name: str, series: Sequence[tuple[str, Array, dict[str, Array]]], unit: str, along: str = "s"
+    ) -> Path:
         """A PNG with a panel for each of ``series``: its title, the time (N,) [s] and curves (N,) by their labels.
 
         The first curve is what was measured; below each panel stands what the others are off from it.
@@ -151,7 +153,7 @@ class Work:
             above.set_ylabel(unit)
             above.legend(fontsize=8)
             below.set_ylabel(f"error, {unit}")
-            below.set_xlabel("s")
+            below.set_xlabel(along)
             for ax in (above, below):
                 ax.grid(alpha=0.3)
         path = self.folder / f"measured_{name}.png"

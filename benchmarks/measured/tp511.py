@@ -25,7 +25,6 @@ SOURCE = Source(
 EXCERPT = None
 COLUMNS, VOLTS, MIDDLE = "festo_tp511", (1, 2, 3, 4, 5), 0.05  # m on either side of mid stroke
 FIT, TEST = ((1, 3), (5, 3)), ((2, 6), (4, 6))  # (volts, run)
-BY_EVERY = 10  # samples: 1 kHz is enough for what is judged here
 OUT, BACK = (62.0, 70.0), (73.0, 81.0)  # N, force by hand that was seen before
 
 
@@ -69,6 +68,17 @@ def error(model: Model, records: list[Record]) -> float:
     return 1e3 * rms(np.concatenate(off))
 
 
+def friction_picture(seen: list[tuple[float, float]], viscous: Model, dry: Model, work: Work) -> None:
+    """Force of the pressures over speed beside the laws; means alone, nothing sample by sample."""
+    speed, force = np.array(sorted(seen)).T
+    laws = {
+        "viscous only, as in the model file": viscous.value("viscous_friction.coefficient") * speed,
+        "fitted with coulomb_friction": dry.value("viscous_friction.coefficient") * speed
+        + dry.value("coulomb_friction.level") * np.sign(speed),
+    }
+    work.picture("tp511", [("mean force of the pressures", speed, {"by hand": force, **laws})], "N", "m/s")
+
+
 def study(data: Path, work: Work) -> list[Row]:
     folder = next(data.rglob("m_find_b_pA_3V_sample_3.mat")).parent
     bare = load_model(MODELS / "tp511.yaml")
@@ -87,10 +97,7 @@ def study(data: Path, work: Work) -> list[Row]:
                       settings=settings).model  # fmt: skip
     errors = error(before, test), error(after, test)
     level, viscous = after.value("coulomb_friction.level"), after.value("viscous_friction.coefficient")
-    first = test[0].window(0.0, min(8.0, test[0].duration))
-    every = slice(None, None, BY_EVERY)
-    runs = {"measured": first["position"], "before": free_run(before, first), "after": free_run(after, first)}
-    work.picture("tp511", [("2 V, run 6", first.time[every], {k: 1e3 * v[every] for k, v in runs.items()})], "mm")
+    friction_picture(seen, bare, after, work)
     named = "coulomb_friction" in found["verdict"]["effects"]
     return [Row(
         "Festo TP511", verdict, evidence, "position in free run over mid stroke, before and with coulomb_friction [mm]",
