@@ -34,9 +34,9 @@ EXCERPT = DATA / "bam"
 QUICK = "sts3250"
 SEGMENT, TRIED, WORTH, TRIALS = 1.5, 4, 0.98, 100
 KNOWN = {
-    "xl330": "a gear, whose friction depends on its load (BAM); a supply that sags is a guess of the data",
+    "xl330": "a gear, whose friction depends on its load (BAM); whether its supply sags is not known",
     "sts3250": "logged every 20 ms while the goal moves on between: named as a fault of the recording",
-    "go1": "a low gear, nearly transparent: little friction of any kind (data sheet)",
+    "go1": "what friction it has is not known beyond what BAM fitted",
 }
 
 Start = Mapping[str, Mapping[str, float]]

@@ -2,7 +2,7 @@
 
 Force is judged as the benchmark does, by inverse dynamics: position filtered at 100 Hz (Butterworth of order 4, both
 ways), central differences, decimation by 10, least squares, and the norm of what is left over that of the force.
-The last third of the record is test data of that fit. `diagnose` gets the record itself, from the published values on.
+The last third of the record is test data of that fit; `diagnose` gets all of the record, from the published values on.
 """
 
 from __future__ import annotations
