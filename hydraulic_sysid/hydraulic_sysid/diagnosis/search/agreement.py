@@ -1,9 +1,9 @@
 """Whether segments agree on what a model explains more than another: a statistic that holds for any noise.
 
-Where little is left, the likelihood of a noise model that is not quite right makes chance look sure: rounding, hum and a
-segment that begins badly are no white noise. Between segments all these are independent. So the size of what one model
-explains more is taken from every segment, and its error from how far the segments differ (cluster-robust Wald test;
-Liang & Zeger, Biometrika 73 (1986), with a segment as a cluster).
+Where little is left, the likelihood of a noise model that is not quite right makes chance look sure: rounding, hum and
+a segment that begins badly are no white noise. Between segments all these are independent. So the size of what one
+model explains more is taken from every segment, and its error from how far the segments differ (cluster-robust Wald
+test; Liang & Zeger, Biometrika 73 (1986), with a segment as a cluster).
 """
 
 from __future__ import annotations
