@@ -23,6 +23,7 @@ from hydraulic_sysid.estimation.parameters import Parameters, bounded
 from hydraulic_sysid.estimation.refinement import outlying, refined, usable
 from hydraulic_sysid.estimation.segments import shorter
 
+from .agreement import agreed
 from .candidate_table import candidate_table
 from .candidates import candidates, delays, observed, subsystem
 from .data_sheet import (
@@ -175,8 +176,14 @@ class Search:
             loose = self.nearer(relaxed(strict.model), far)
         except SimulationError:  # it went where the plant does not run
             return None
-        helps = material(strict.misfit, loose.misfit) and explained(strict.misfit, loose.misfit) > FURTHER
+        helps = self.better(strict, loose) and explained(strict.misfit, loose.misfit) > FURTHER
         return loose if helps else None
+
+    def better(self, before: SearchState, after: SearchState) -> bool:
+        """Whether what a state explains more than another is more than chance; where little is left, by any noise."""
+        if not material(before.misfit, after.misfit):
+            return False
+        return not before.misfit.little or agreed(before.residual, after.residual, self.split.fit)
 
     def nearer(self, model: Model, far: bool) -> SearchState:
         """A model fitted: where it is ``far`` off, to the end only if it comes near.
@@ -521,7 +528,7 @@ class Search:
                 state = self.begun_anew(self.state(tried.refit.model, self._last))
             except SimulationError:
                 continue
-            if material(base.misfit, state.misfit) and enough(tried.name, state.misfit, 1.0):
+            if self.better(base, state) and enough(tried.name, state.misfit, 1.0):
                 found.append(state)
         return min(found, key=lambda s: s.misfit.total, default=None)
 

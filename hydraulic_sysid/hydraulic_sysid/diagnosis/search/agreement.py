@@ -1,0 +1,51 @@
+"""Whether segments agree on what a model explains more than another: a statistic that holds for any noise.
+
+Where little is left, the likelihood of a noise model that is not quite right makes chance look sure: rounding, hum and
+a segment that begins badly are no white noise. Between segments all these are independent. So the size of what one
+model explains more is taken from every segment, and its error from how far the segments differ (cluster-robust Wald
+test; Liang & Zeger, Biometrika 73 (1986), with a segment as a cluster).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array, Mask
+
+AGREED = 50.0  # squared size over its variance on segments for fitting, …
+CONFIRMED = 10.0  # … and on those for validation: chance and wrong noise gave 44 and less, effects 80 and more
+
+
+def agreed(before: Sequence[Array], after: Sequence[Array], fit: Sequence[Mask]) -> bool:
+    """Whether segments agree that there is something of what ``after`` explains more than ``before``.
+
+    :param before: residuals over noise (S, m), per record
+    :param after: the same of the other model
+    :param fit: (S,) which segments were fitted, per record
+    """
+    parts = [f for f in (np.concatenate(list(fit)), ~np.concatenate(list(fit))) if f.any()]
+    own, size = _in_segments(before, after)
+    found = [agreement(own[part], size[part]) for part in parts]
+    return all(f > least for f, least in zip(found, (AGREED, CONFIRMED), strict=False))
+
+
+def agreement(own: Array, size: Array) -> float:
+    """Squared estimate of the share of a change that is there, over its variance.
+
+    :param own: (S,) product of each segment's residual and the change
+    :param size: (S,) sum of squares of the change
+    """
+    total = float(size.sum())
+    if total <= 0.0:
+        return 0.0
+    share = float(own.sum()) / total
+    spread = float(np.sum((own - share * size) ** 2))
+    return (share * total) ** 2 / max(spread, np.finfo(float).tiny) if share > 0.0 else 0.0
+
+
+def _in_segments(before: Sequence[Array], after: Sequence[Array]) -> tuple[Array, Array]:
+    changes = [b - a for b, a in zip(before, after, strict=True)]
+    own = [np.sum(c * b, axis=1) for c, b in zip(changes, before, strict=True)]
+    return np.concatenate(own), np.concatenate([np.sum(c**2, axis=1) for c in changes])
