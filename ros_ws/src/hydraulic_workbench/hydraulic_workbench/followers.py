@@ -63,6 +63,7 @@ class LiveModel:
     """The model beside the plant: the estimator, with the model that a page chooses."""
 
     def __init__(self, board: Board, processes: Processes) -> None:
+        self._board = board
         self.node = Follower("live_model", "hydraulic_sysid.nodes.estimator", board, processes)
 
     async def choose(self, model: Entry | None) -> None:
@@ -71,6 +72,10 @@ class LiveModel:
             await self.node.stop()
         else:
             await self.node.start({"model": str(model.file)}, model=model.id, name=model.document()["name"])
+
+    def says(self, residual: float | None) -> None:
+        """Put on the board what the node says of its residual: RMS of the position [m]."""
+        self._board.change("live_model", residual=residual if self.node.running else None)
 
 
 class Controller:

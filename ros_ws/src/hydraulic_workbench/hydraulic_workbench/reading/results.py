@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hydraulic_sysid.data.decimation import envelope
+from hydraulic_sysid.data.display import TITLES
 from hydraulic_sysid.data.results import plain, read_folder, verb_of
 from hydraulic_workbench.errors import UnknownError, WorkbenchError
 
@@ -106,7 +107,8 @@ def samples(folder: Path, channel: str, variable: str, low: float, high: float, 
     segments.sort(key=lambda s: -s["count"])
     total = sum(time.size for _, time, _, _ in rows)
     found = _thinned(rows, max(points // max(len(rows), 1), 50))
-    text = f"{total} samples of {channel.replace('_', ' ')} with {variable.replace('_', ' ')} in that range"
+    titles = [TITLES.get(name, name.replace("_", " ")) for name in (channel, variable)]
+    text = f"{total} samples of {titles[0]} with {titles[1]} in that range"
     return plain({"segments": segments[:200], "samples": found, "count": total, "text": text})
 
 

@@ -20,7 +20,7 @@ def routes(bench: Bench) -> list[web.AbstractRouteDef]:
 
     async def live_model(request: web.Request) -> web.Response:
         wanted = (await asked(request)).get("model")
-        await bench.live_model.choose(bench.model(wanted) if wanted else None)
+        await bench.choose_live_model(bench.model(wanted) if wanted else None)
         return answer(status=202)
 
     async def choices(_: web.Request) -> web.Response:

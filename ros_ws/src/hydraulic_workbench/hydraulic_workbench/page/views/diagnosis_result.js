@@ -91,5 +91,5 @@ export function diagnosisResult(doc, job) {
     </section>
     ${added ? nothing : html`<section class="card flush" aria-label="Candidates"><header><h2>Candidates</h2><span class="soft small">a row opens on a click</span></header>
       ${candidateTable(rows(job, doc), { doc, add: (name) => addEffect(job, name), busy: anyRuns() })}</section>`}
-    ${beforeAfter(doc)}`;
+    ${beforeAfter(doc, job.run)}`;
 }
