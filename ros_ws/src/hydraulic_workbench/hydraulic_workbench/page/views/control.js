@@ -101,7 +101,7 @@ function law() {
   const parameters = (state.gains?.parameters ?? []).filter((one) => one.live);
   return html`<div class="row spread"><strong>${words(now.law)}</strong>
       <span class="row"><button class="small" id="undo-gains" ?disabled=${!operates() || !now.can_undo} @click=${undo}>${undoIcon()}Undo</button>
-      <button class="small" ?disabled=${!operates()} @click=${() => attempt(() => post("/api/controller/stop"))}>Stop</button></span></div>
+      <button class="small" id="stop-controller" ?disabled=${!operates()} @click=${() => attempt(() => post("/api/controller/stop"))}>Stop</button></span></div>
     <div class="stack tight gains">${parameters.map((one) => field(one, set))}</div>`;
 }
 

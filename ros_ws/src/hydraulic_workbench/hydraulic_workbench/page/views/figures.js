@@ -8,6 +8,7 @@ import "../charts/plotly_figure.js";
 const lists = new Map(); // run → figures
 const fetched = new Map(); // run and name → figure
 const chosen = new Map(); // run → name
+const unfolded = new Set(); // runs whose figures are shown
 
 const base = (run) => `/api/runs/${encodeURIComponent(run)}`;
 
@@ -16,6 +17,14 @@ async function openList(run) {
   lists.set(run, null);
   const answer = await attempt(() => get(`${base(run)}/figures`));
   lists.set(run, answer?.figures ?? []);
+  changed();
+}
+
+function unfold(run, open) {
+  if (unfolded.has(run) === open) return;
+  if (open) unfolded.add(run);
+  else unfolded.delete(run);
+  if (open) openList(run);
   changed();
 }
 
@@ -50,9 +59,9 @@ export function figures(job) {
   const name = chosen.get(run) ?? list?.[0]?.name;
   return html`<section class="card" aria-label="Report"><header><h2>Report</h2>
       <a class="button" href=${`${base(run)}/report`} target="_blank" rel="noopener">Open the whole report</a></header>
-    <details @toggle=${(event) => event.target.open && openList(run)}><summary>Its figures, to zoom</summary>
-      ${list === null ? html`<i class="spinner"></i>` : nothing}
-      ${list?.length ? html`<label class="field">Figure <select @change=${(event) => choose(run, event.target.value)}>
+    <details ?open=${unfolded.has(run)} @toggle=${(event) => unfold(run, event.target.open)}><summary>Its figures, to zoom</summary>
+      ${unfolded.has(run) && !list ? html`<i class="spinner"></i>` : nothing}
+      ${unfolded.has(run) && list?.length ? html`<label class="field">Figure <select @change=${(event) => choose(run, event.target.value)}>
         ${list.map((one) => html`<option value=${one.name} ?selected=${one.name === name}>${[one.title, one.record, one.channel].filter(Boolean).join(" · ")}</option>`)}</select></label>
         ${figure(run, name)}` : nothing}
       ${list && !list.length ? html`<p class="soft">It has none.</p>` : nothing}

@@ -1,6 +1,6 @@
 // Results that need no picture of their own.
 import { html, nothing } from "../core/html.js";
-import { update } from "../core/store.js";
+import { state, update } from "../core/store.js";
 import { open } from "../core/actions.js";
 import { digits, percent, words } from "../core/format.js";
 import { quantity } from "../core/quantities.js";
@@ -27,8 +27,8 @@ export function calibrateResult(doc) {
         <td>${one.identifiable ? nothing : html`<span class="chip fair">not identifiable</span>`}${one.at_bound ? html`<span class="chip poor">at ${one.at_bound} bound</span>` : nothing}</td></tr>`)}</tbody></table></div></section>`;
 }
 
-export function nextExperimentResult(doc) {
-  const toTab = () => { update({ plan: null }); open("experiment"); };
+export function nextExperimentResult(doc, job) {
+  const toTab = () => { update({ plan: state.plans.find((plan) => plan.run === job.run)?.id ?? null }); open("experiment"); };
   return html`<section class="card" aria-label="Next experiment"><header><h2>The next experiment</h2>
       <button class="primary" id="to-experiment" @click=${toTab}>To the experiment</button></header>
     <p class="verdict ${doc.verdict?.level ?? ""}">${doc.verdict?.text}</p>
