@@ -17,15 +17,8 @@ EFFECT = Effect(
     summary="a force that does not change",
     kernel=force,
     parameters=(
-        Parameter(
-            "load",
-            "N",
-            500.0,
-            (-1e6, 1e6),
-            "load force; positive extends",
-            "a tenth of the weight of the paper's 500 kg",
-            null=0.0,
-        ),
+        Parameter("load", "N", 500.0, (-1e6, 1e6), "load force; positive extends",
+                  "a tenth of the weight of the paper's 500 kg", null=0.0),
     ),
     equation="F = F_load",
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",

@@ -21,15 +21,8 @@ EFFECT = Effect(
     summary="dry friction of constant size",
     kernel=force,
     parameters=(
-        Parameter(
-            "level",
-            "N",
-            450.0,
-            (0.0, 1e5),
-            "friction force Fc while sliding",
-            "Nisar & Munawar, table of parameters",
-            null=0.0,
-        ),
+        Parameter("level", "N", 450.0, (0.0, 1e5), "friction force Fc while sliding",
+                  "Nisar & Munawar, table of parameters", null=0.0),
     ),
     equation="F = -Fc*sign(v), regularised over micrometres",
     source="Merritt (1967), Hydraulic Control Systems, ch. 6; Dahl (1968)",

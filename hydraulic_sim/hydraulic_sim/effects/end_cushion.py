@@ -24,15 +24,8 @@ EFFECT = Effect(
     summary="throttling near the stops",
     kernel=force,
     parameters=(
-        Parameter(
-            "coefficient",
-            "N*s^2/m^2",
-            2e5,
-            (0.0, 1e9),
-            "force over the square of speed at the stop",
-            "cushions take a moving load to rest within their length",
-            null=0.0,
-        ),
+        Parameter("coefficient", "N*s^2/m^2", 2e5, (0.0, 1e9), "force over the square of speed at the stop",
+                  "cushions take a moving load to rest within their length", null=0.0),
         Parameter("length", "m", 0.08, (1e-3, 1.0), "length of the cushion", "cylinder catalogues: 20 to 100 mm"),
     ),
     equation="F = -c*v*|v|*r^2 within the cushion, towards the stop",

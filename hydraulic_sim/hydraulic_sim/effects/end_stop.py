@@ -23,18 +23,10 @@ EFFECT = Effect(
     summary="contact at both ends of the stroke",
     kernel=force,
     parameters=(
-        Parameter(
-            "stiffness",
-            "N/m",
-            6.14e8,
-            (1e3, 1e11),
-            "contact stiffness",
-            "Nisar & Munawar, table of parameters",
-            free=False,
-        ),
-        Parameter(
-            "damping", "N*s/m", 200.0, (0.0, 1e8), "contact damping", "Nisar & Munawar, table of parameters", free=False
-        ),
+        Parameter("stiffness", "N/m", 6.14e8, (1e3, 1e11), "contact stiffness",
+                  "Nisar & Munawar, table of parameters", free=False),
+        Parameter("damping", "N*s/m", 200.0, (0.0, 1e8), "contact damping", "Nisar & Munawar, table of parameters",
+                  free=False),
     ),
     equation="F = -(k*d + c*v), d = |x| - stroke/2 > 0, never pulling",
     source="Hunt & Crossley (1975), J. Applied Mechanics 42",

@@ -41,15 +41,8 @@ EFFECT = Effect(
     summary="air bubbles that soften the oil at low pressure",
     kernel=compliance,
     parameters=(
-        Parameter(
-            "fraction",
-            "1",
-            0.01,
-            (0.0, 0.2),
-            "air by volume at atmospheric pressure, alpha",
-            "Jelali & Kroll (2003), ch. 3: 0.5 to 5 %",
-            null=0.0,
-        ),
+        Parameter("fraction", "1", 0.01, (0.0, 0.2), "air by volume at atmospheric pressure, alpha",
+                  "Jelali & Kroll (2003), ch. 3: 0.5 to 5 %", null=0.0),
         Parameter("exponent", "1", 1.4, (1.0, 1.4), "polytropic exponent n", "isothermal 1 to adiabatic 1.4"),
     ),
     equation="1/be = [(1-a)*e/b + a*(p0/p)^(1/n)/(n*p)] / [(1-a)*e + a*(p0/p)^(1/n)], e = exp(-(p-p0)/b)",

@@ -18,15 +18,9 @@ EFFECT = Effect(
     summary="oil lost from each chamber to the outside",
     kernel=flow,
     parameters=(
-        Parameter(
-            "coefficient",
-            "m^3/(s*Pa)",
-            5e-13,
-            (0.0, 1e-9),
-            "leakage coefficient Ce",
-            "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: of the order of the internal one",
-            null=0.0,
-        ),
+        Parameter("coefficient", "m^3/(s*Pa)", 5e-13, (0.0, 1e-9), "leakage coefficient Ce",
+                  "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: of the order of the internal one",
+                  null=0.0),
     ),
     equation="q = Ce*p per chamber",
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",

@@ -20,15 +20,8 @@ EFFECT = Effect(
     summary="dry friction that differs by direction",
     kernel=force,
     parameters=(
-        Parameter(
-            "difference",
-            "N",
-            100.0,
-            (-1e5, 1e5),
-            "half the difference of the friction levels by direction",
-            "a fifth of the dry friction of the paper's actuator",
-            null=0.0,
-        ),
+        Parameter("difference", "N", 100.0, (-1e5, 1e5), "half the difference of the friction levels by direction",
+                  "a fifth of the dry friction of the paper's actuator", null=0.0),
     ),
     equation="F = -dF*|sign(v)|",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

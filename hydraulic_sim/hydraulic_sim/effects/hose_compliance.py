@@ -17,15 +17,8 @@ EFFECT = Effect(
     summary="hoses and lines that give way",
     kernel=compliance,
     parameters=(
-        Parameter(
-            "capacity",
-            "m^3/Pa",
-            5e-13,
-            (0.0, 1e-9),
-            "volume gained per pressure, each side",
-            "2 m of 3/4 inch hose at a wall modulus of 0.7 GPa and its content",
-            null=0.0,
-        ),
+        Parameter("capacity", "m^3/Pa", 5e-13, (0.0, 1e-9), "volume gained per pressure, each side",
+                  "2 m of 3/4 inch hose at a wall modulus of 0.7 GPa and its content", null=0.0),
     ),
     equation="C = V/beta + Ch",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 3",

@@ -18,15 +18,8 @@ EFFECT = Effect(
     summary="laminar flow past the piston",
     kernel=flow,
     parameters=(
-        Parameter(
-            "coefficient",
-            "m^3/(s*Pa)",
-            5e-13,
-            (0.0, 1e-9),
-            "leakage coefficient Ci",
-            "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: 1e-13 to 1e-11",
-            null=0.0,
-        ),
+        Parameter("coefficient", "m^3/(s*Pa)", 5e-13, (0.0, 1e-9), "leakage coefficient Ci",
+                  "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: 1e-13 to 1e-11", null=0.0),
     ),
     equation="q = Ci*(p_A - p_B)",
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",

@@ -17,9 +17,8 @@ EFFECT = Effect(
     summary="a force proportional to position",
     kernel=force,
     parameters=(
-        Parameter(
-            "stiffness", "N/m", 3000.0, (0.0, 1e9), "spring rate k", "a few kN at the stops of a 1.5 m stroke", null=0.0
-        ),
+        Parameter("stiffness", "N/m", 3000.0, (0.0, 1e9), "spring rate k", "a few kN at the stops of a 1.5 m stroke",
+                  null=0.0),
     ),
     equation="F = -k*x",
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",

@@ -18,15 +18,9 @@ EFFECT = Effect(
     summary="dry friction that changes along the stroke",
     kernel=force,
     parameters=(
-        Parameter(
-            "growth",
-            "N/m^2",
-            800.0,
-            (0.0, 1e8),
-            "growth of the friction level with the square of the position",
-            "doubles the paper's 450 N at the stops of a 1.5 m stroke",
-            null=0.0,
-        ),
+        Parameter("growth", "N/m^2", 800.0, (0.0, 1e8),
+                  "growth of the friction level with the square of the position",
+                  "doubles the paper's 450 N at the stops of a 1.5 m stroke", null=0.0),
     ),
     equation="F = -g*x^2*sign(v)",
     source="Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30(7)",

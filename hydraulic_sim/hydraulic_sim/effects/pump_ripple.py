@@ -19,15 +19,8 @@ EFFECT = Effect(
     summary="a sine on the supply pressure",
     kernel=ripple,
     parameters=(
-        Parameter(
-            "amplitude",
-            "Pa",
-            2e5,
-            (0.0, 1e7),
-            "amplitude of the ripple",
-            "piston pumps: 1 to 5 % of pressure",
-            null=0.0,
-        ),
+        Parameter("amplitude", "Pa", 2e5, (0.0, 1e7), "amplitude of the ripple", "piston pumps: 1 to 5 % of pressure",
+                  null=0.0),
         Parameter("frequency", "Hz", 200.0, (0.5, 500.0), "frequency of the ripple", "9 pistons at 1500 1/min: 225 Hz"),
         Parameter("phase", "rad", 0.0, (-7.0, 7.0), "phase at the start", "not known beforehand"),
     ),

@@ -23,18 +23,10 @@ EFFECT = Effect(
     dynamics=dynamics,
     states=(State("return_pressure", "Pa", initial="tank_pressure", kind="relaxation", scale=1e5),),
     parameters=(
-        Parameter(
-            "resistance",
-            "Pa*s^2/m^6",
-            3e11,
-            (0.0, 1e15),
-            "back pressure over the square of flow, R",
-            "0.3 MPa at 60 l/min",
-            null=0.0,
-        ),
-        Parameter(
-            "time", "s", 5e-3, (1e-3, 1.0), "filling time of the return line", "a few metres of hose", free=False
-        ),
+        Parameter("resistance", "Pa*s^2/m^6", 3e11, (0.0, 1e15), "back pressure over the square of flow, R",
+                  "0.3 MPa at 60 l/min", null=0.0),
+        Parameter("time", "s", 5e-3, (1e-3, 1.0), "filling time of the return line", "a few metres of hose",
+                  free=False),
     ),
     equation="pt = Pt + R*q*|q|, within the line's filling time",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

@@ -25,9 +25,8 @@ EFFECT = Effect(
     kernel=lag_behind,
     memory=2,
     parameters=(
-        Parameter(
-            "half_gap", "m", 2e-4, (0.0, 0.02), "half the play", "ball joints of a sensor rod: 0.05 to 0.5 mm", null=0.0
-        ),
+        Parameter("half_gap", "m", 2e-4, (0.0, 0.02), "half the play", "ball joints of a sensor rod: 0.05 to 0.5 mm",
+                  null=0.0),
     ),
     equation="y_k = min(max(y_{k-1}, x_k - g), x_k + g)",
     source="Visintin (1994), Differential Models of Hysteresis, ch. III",

@@ -17,15 +17,8 @@ EFFECT = Effect(
     summary="cubic error of the position sensor",
     kernel=bend,
     parameters=(
-        Parameter(
-            "cubic",
-            "1/m^2",
-            0.05,
-            (-1e3, 1e3),
-            "cubic coefficient c",
-            "LVDT near the ends of its range: 1 to 3 %",
-            null=0.0,
-        ),
+        Parameter("cubic", "1/m^2", 0.05, (-1e3, 1e3), "cubic coefficient c",
+                  "LVDT near the ends of its range: 1 to 3 %", null=0.0),
     ),
     equation="y = x + c*x^3",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

@@ -17,9 +17,8 @@ EFFECT = Effect(
     summary="zero error of the position sensor",
     kernel=shift,
     parameters=(
-        Parameter(
-            "offset", "m", 5e-3, (-1.0, 1.0), "reading at true zero", "mounting of an LVDT: millimetres", null=0.0
-        ),
+        Parameter("offset", "m", 5e-3, (-1.0, 1.0), "reading at true zero", "mounting of an LVDT: millimetres",
+                  null=0.0),
     ),
     equation="y = x + a",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

@@ -17,9 +17,8 @@ EFFECT = Effect(
     summary="gain error of the position sensor",
     kernel=scale_reading,
     parameters=(
-        Parameter(
-            "scale", "1", 1.03, (0.2, 5.0), "reading over true position", "LVDT data sheets: within 1 to 3 %", null=1.0
-        ),
+        Parameter("scale", "1", 1.03, (0.2, 5.0), "reading over true position", "LVDT data sheets: within 1 to 3 %",
+                  null=1.0),
     ),
     equation="y = c*x",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

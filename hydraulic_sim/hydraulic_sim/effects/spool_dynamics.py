@@ -38,15 +38,8 @@ EFFECT = Effect(
     dynamics=dynamics,
     states=(State("lift", "1", initial="command"), State("lift_rate", "1/s", scale=100.0)),
     parameters=(
-        Parameter(
-            "frequency",
-            "Hz",
-            80.0,
-            (5.0, IDEAL),
-            "natural frequency f",
-            "two-stage servo valves of this class: 30 to 150 Hz",
-            null=IDEAL,
-        ),
+        Parameter("frequency", "Hz", 80.0, (5.0, IDEAL), "natural frequency f",
+                  "two-stage servo valves of this class: 30 to 150 Hz", null=IDEAL),
         Parameter("damping", "1", 0.7, (0.2, 2.0), "damping ratio", "two-stage servo valves: 0.5 to 0.9"),
     ),
     equation="d2s/dt2 = w^2*(s_d - s) - 2*zeta*w*ds/dt",

@@ -34,15 +34,8 @@ EFFECT = Effect(
     kernel=limit_rate,
     memory=2,
     parameters=(
-        Parameter(
-            "rate",
-            "1/s",
-            30.0,
-            (0.5, IDEAL),
-            "largest speed of the spool, full openings per second",
-            "two-stage valves: full stroke in 5 to 50 ms",
-            null=IDEAL,
-        ),
+        Parameter("rate", "1/s", 30.0, (0.5, IDEAL), "largest speed of the spool, full openings per second",
+                  "two-stage valves: full stroke in 5 to 50 ms", null=IDEAL),
     ),
     equation="|ds/dt| <= r",
     source="Merritt (1967), Hydraulic Control Systems, ch. 7",

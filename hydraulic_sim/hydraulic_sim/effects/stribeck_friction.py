@@ -21,15 +21,8 @@ EFFECT = Effect(
     summary="dry friction that rises towards standstill",
     kernel=force,
     parameters=(
-        Parameter(
-            "rise",
-            "N",
-            200.0,
-            (0.0, 1e5),
-            "break-away friction above sliding friction, Fs - Fc",
-            "Jelali & Kroll (2003): Fs is 1.2 to 2 times Fc",
-            null=0.0,
-        ),
+        Parameter("rise", "N", 200.0, (0.0, 1e5), "break-away friction above sliding friction, Fs - Fc",
+                  "Jelali & Kroll (2003): Fs is 1.2 to 2 times Fc", null=0.0),
         Parameter("speed", "m/s", 0.01, (1e-4, 0.2), "Stribeck speed v_s", "hydraulic seals: 1 to 20 mm/s"),
     ),
     equation="F = -(Fs - Fc)*exp(-(v/vs)^2)*sign(v)",

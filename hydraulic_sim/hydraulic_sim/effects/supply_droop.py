@@ -23,15 +23,8 @@ EFFECT = Effect(
     dynamics=dynamics,
     states=(State("line_pressure", "Pa", initial="supply_pressure", kind="relaxation", scale=1e6),),
     parameters=(
-        Parameter(
-            "resistance",
-            "Pa*s/m^3",
-            1e9,
-            (0.0, 1e12),
-            "drop of the supply per flow drawn, R",
-            "1 MPa at 60 l/min",
-            null=0.0,
-        ),
+        Parameter("resistance", "Pa*s/m^3", 1e9, (0.0, 1e12), "drop of the supply per flow drawn, R",
+                  "1 MPa at 60 l/min", null=0.0),
         Parameter("time", "s", 0.1, (1e-3, 100.0), "time constant tau", "small accumulator: 0.05 to 1 s"),
     ),
     equation="dps/dt = (Ps - R*q - ps)/tau",

@@ -21,15 +21,8 @@ EFFECT = Effect(
     summary="orifice flow past the piston",
     kernel=flow,
     parameters=(
-        Parameter(
-            "coefficient",
-            "m^3/(s*Pa^0.5)",
-            5e-9,
-            (0.0, 1e-5),
-            "flow over the root of the drop",
-            "as much as the laminar leakage of a worn seal at 3 MPa",
-            null=0.0,
-        ),
+        Parameter("coefficient", "m^3/(s*Pa^0.5)", 5e-9, (0.0, 1e-5), "flow over the root of the drop",
+                  "as much as the laminar leakage of a worn seal at 3 MPa", null=0.0),
     ),
     equation="q = C*sqrt(|PL|)*sign(PL)",
     source="Merritt (1967), Hydraulic Control Systems, ch. 3",

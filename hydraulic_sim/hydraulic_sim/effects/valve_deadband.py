@@ -21,15 +21,8 @@ EFFECT = Effect(
     summary="no flow for small openings",
     kernel=opening,
     parameters=(
-        Parameter(
-            "width",
-            "1",
-            0.02,
-            (0.0, 0.3),
-            "overlap to each side, of full opening",
-            "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: up to 5 % and more",
-            null=0.0,
-        ),
+        Parameter("width", "1", 0.02, (0.0, 0.3), "overlap to each side, of full opening",
+                  "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: up to 5 % and more", null=0.0),
     ),
     equation="o = 0 for |o| < d, else o - d*sign(o)",
     source="Merritt (1967), Hydraulic Control Systems, ch. 5",

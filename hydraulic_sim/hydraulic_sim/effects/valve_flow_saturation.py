@@ -19,15 +19,8 @@ EFFECT = Effect(
     summary="an opening that is limited",
     kernel=limit_opening,
     parameters=(
-        Parameter(
-            "limit",
-            "1",
-            0.7,
-            (0.02, 1.0),
-            "largest opening, of full opening",
-            "flow through narrow ports behind the lands",
-            null=1.0,
-        ),
+        Parameter("limit", "1", 0.7, (0.02, 1.0), "largest opening, of full opening",
+                  "flow through narrow ports behind the lands", null=1.0),
     ),
     equation="o = min(max(s, -l), l)",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

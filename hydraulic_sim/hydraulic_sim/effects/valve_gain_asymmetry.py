@@ -17,15 +17,8 @@ EFFECT = Effect(
     summary="flow gain that differs by direction",
     kernel=scale,
     parameters=(
-        Parameter(
-            "asymmetry",
-            "1",
-            0.05,
-            (-0.6, 0.6),
-            "relative difference of each side's gain from the mean",
-            "servo valve data sheets: symmetry within 10 %",
-            null=0.0,
-        ),
+        Parameter("asymmetry", "1", 0.05, (-0.6, 0.6), "relative difference of each side's gain from the mean",
+                  "servo valve data sheets: symmetry within 10 %", null=0.0),
     ),
     equation="o = (1 +/- a)*s",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

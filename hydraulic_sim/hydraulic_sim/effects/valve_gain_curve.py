@@ -17,15 +17,8 @@ EFFECT = Effect(
     summary="progressive flow over opening",
     kernel=bend,
     parameters=(
-        Parameter(
-            "progression",
-            "1",
-            0.3,
-            (-0.9, 0.95),
-            "share of the quadratic part, c; negative: degressive",
-            "proportional valve data sheets: progressive spools",
-            null=0.0,
-        ),
+        Parameter("progression", "1", 0.3, (-0.9, 0.95), "share of the quadratic part, c; negative: degressive",
+                  "proportional valve data sheets: progressive spools", null=0.0),
     ),
     equation="o = s*(1 - c + c*|s|)",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

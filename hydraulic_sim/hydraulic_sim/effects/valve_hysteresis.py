@@ -20,15 +20,8 @@ EFFECT = Effect(
     kernel=lag_behind,
     memory=1,
     parameters=(
-        Parameter(
-            "half_width",
-            "1",
-            0.01,
-            (0.0, 0.2),
-            "half the width of the loop, of full opening",
-            "servo valve data sheets: hysteresis up to 3 % of rated drive",
-            null=0.0,
-        ),
+        Parameter("half_width", "1", 0.01, (0.0, 0.2), "half the width of the loop, of full opening",
+                  "servo valve data sheets: hysteresis up to 3 % of rated drive", null=0.0),
     ),
     equation="s_k = min(max(s_{k-1}, u_k - h), u_k + h)",
     source="Visintin (1994), Differential Models of Hysteresis, ch. III",

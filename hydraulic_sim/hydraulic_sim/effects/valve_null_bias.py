@@ -17,15 +17,8 @@ EFFECT = Effect(
     summary="the valve is open a little at zero drive",
     kernel=shift,
     parameters=(
-        Parameter(
-            "bias",
-            "1",
-            0.02,
-            (-0.3, 0.3),
-            "opening at zero drive, of full opening",
-            "servo valve data sheets: null bias up to 3 %",
-            null=0.0,
-        ),
+        Parameter("bias", "1", 0.02, (-0.3, 0.3), "opening at zero drive, of full opening",
+                  "servo valve data sheets: null bias up to 3 %", null=0.0),
     ),
     equation="o = s + b",
     source="Merritt (1967), Hydraulic Control Systems, ch. 5",

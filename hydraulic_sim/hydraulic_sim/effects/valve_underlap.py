@@ -21,15 +21,8 @@ EFFECT = Effect(
     summary="all lands open around null",
     kernel=lands,
     parameters=(
-        Parameter(
-            "width",
-            "1",
-            0.02,
-            (0.0, 0.3),
-            "underlap of each land, of full opening",
-            "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: up to 5 %",
-            null=0.0,
-        ),
+        Parameter("width", "1", 0.02, (0.0, 0.3), "underlap of each land, of full opening",
+                  "Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4: up to 5 %", null=0.0),
     ),
     equation="o_PA = o_BT = max(d + s, 0), o_AT = o_PB = max(d - s, 0)",
     source="Merritt (1967), Hydraulic Control Systems, ch. 5",

@@ -21,15 +21,8 @@ EFFECT = Effect(
     summary="viscous terms that change as the oil warms",
     kernel=drift,
     parameters=(
-        Parameter(
-            "change",
-            "1",
-            -0.3,
-            (-0.9, 5.0),
-            "relative change of the viscosity in the long run, a",
-            "mineral oil ISO VG 46 from 40 to 50 degC loses about 30 %",
-            null=0.0,
-        ),
+        Parameter("change", "1", -0.3, (-0.9, 5.0), "relative change of the viscosity in the long run, a",
+                  "mineral oil ISO VG 46 from 40 to 50 degC loses about 30 %", null=0.0),
         Parameter("time", "s", 60.0, (0.5, 1e5), "time constant tau", "heating of a small power pack: minutes"),
     ),
     equation="mu = 1 + a*(1 - exp(-t/tau))",

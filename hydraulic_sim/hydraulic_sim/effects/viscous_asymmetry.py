@@ -19,15 +19,8 @@ EFFECT = Effect(
     summary="viscous friction that differs by direction",
     kernel=force,
     parameters=(
-        Parameter(
-            "difference",
-            "N*s/m",
-            50.0,
-            (-1e5, 1e5),
-            "half the difference of the coefficients by direction",
-            "a third of the viscous friction of the paper's actuator",
-            null=0.0,
-        ),
+        Parameter("difference", "N*s/m", 50.0, (-1e5, 1e5), "half the difference of the coefficients by direction",
+                  "a third of the viscous friction of the paper's actuator", null=0.0),
     ),
     equation="F = -db*|v|",
     source="Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4",

@@ -17,15 +17,8 @@ EFFECT = Effect(
     summary="friction proportional to speed",
     kernel=force,
     parameters=(
-        Parameter(
-            "coefficient",
-            "N*s/m",
-            164.0,
-            (0.0, 1e6),
-            "viscous friction coefficient b",
-            "Nisar & Munawar, table of parameters: 64 and 100 N/(m/s) acting together",
-            null=0.0,
-        ),
+        Parameter("coefficient", "N*s/m", 164.0, (0.0, 1e6), "viscous friction coefficient b",
+                  "Nisar & Munawar, table of parameters: 64 and 100 N/(m/s) acting together", null=0.0),
     ),
     equation="F = -b*v",
     source="Merritt (1967), Hydraulic Control Systems, ch. 6",
