@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,11 @@ from typing import Any
 import pytest
 from page_steps import drop, start_simulator, until
 
+from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_workbench.library import OWN_PLANS
 
 SAMPLE = Path(__file__).parents[3] / "examples" / "sample_bench"
+TIED = ("spool_dynamics", "command_delay")
 FINISHES = "id => workbench.state.jobs.find((job) => job.id === id)?.phase === 'finished'"
 
 
@@ -24,7 +27,29 @@ def bench(start_bench: Callable[..., Any], tmp_path_factory: pytest.TempPathFact
     too_far = plan.replace("travel_limit: 0.6 ", "travel_limit: 0.001 ").replace("name: first_look", "name: too_far")
     assert too_far.count("too_far") == 1 and "0.001" in too_far
     (folder / "plans" / "too_far.yaml").write_text(too_far)
-    yield start_bench("--open", str(SAMPLE), str(folder))
+    leave_a_tie(folder / "earlier" / "runs" / "001-diagnose")
+    yield start_bench("--folder", str(folder / "earlier"), "--open", str(SAMPLE), str(folder / "plans"))
+
+
+def leave_a_tie(run: Path) -> None:
+    """A diagnosis of an earlier workbench in this folder that two effects explain alike."""
+    run.mkdir(parents=True)
+    over = {"fit": 1.0, "validation": 1.0}
+    verdict = {"kind": "indistinguishable", "level": "close", "effects": list(TIED), "text": f"One of {TIED}."}
+    document = {
+        "schema": "hydraulic_sysid.diagnose/2", "created": "2026-01-01T00:00:00+00:00", "verdict": verdict,
+        "settings": {"segment_length": 0.5}, "noise_std": {"position": {"record": 2e-5}}, "effects": [],
+        "residual": {"before": {"fit": 3.0, "validation": 3.0}, "after": over, "after_each_effect": []},
+    }  # fmt: skip
+    (run / "diagnose.json").write_text(json.dumps(document))
+    for name in TIED:
+        save_model(load_model("sample_bench").with_effect(name), run / f"competing_{name}.yaml")
+    job = {
+        "id": run.name, "verb": "diagnose", "title": "diagnose", "line": [], "model": "mod-sample_bench", "records": [],
+        "plan": None, "phase": "finished", "error": "", "exit_code": 0, "created": 1.0, "seconds": 1.0, "residual": [],
+        "candidates": [],
+    }  # fmt: skip
+    (run / "job.json").write_text(json.dumps(job))
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +98,7 @@ def test_a_plan_that_leaves_its_limits_cannot_be_started(page: Any, picture: Cal
     page.click(".plan:has-text('too_far')")
     page.wait_for_selector("[aria-label=Gate] .chip:has-text('rehearsal failed')")
     assert page.locator("#start-experiment").is_disabled()
-    assert page.locator("ul.gate .gate-poor strong").all_inner_texts() == ["Travel"], "all else is well"
+    assert page.locator("ul.gate .gate-poor strong").all_inner_texts() == ["Plays to its end"], "all else is well"
     picture(page, "experiment-refused")
     rehearsal = page.evaluate("workbench.state.jobs.find((one) => one.plan === 'plan-too_far')")
     assert rehearsal["good"] is False
@@ -94,6 +119,16 @@ def test_an_experiment_is_designed_run_and_aborted(page: Any, picture: Callable[
     page.wait_for_selector("[aria-label=Result] .chip:has-text('aborted')")
     assert page.locator('#next:has-text("Diagnose")').count() == 0
     picture(page, "experiment-aborted")
+
+
+def test_the_next_experiment_goes_to_its_tab(page: Any, picture: Callable[..., None]) -> None:
+    page.evaluate("location.hash = '#/diagnose'")
+    page.click("#next-experiment:not([disabled])")
+    page.wait_for_selector("[aria-label='Next experiment'] tbody tr")
+    picture(page, "next-experiment")
+    page.click("#to-experiment")
+    page.wait_for_selector(".plan.chosen:has-text('proposed by a diagnosis')")
+    page.wait_for_selector("[aria-label=Rehearsal] canvas")
 
 
 def test_the_folder_of_a_bag_is_dropped(page: Any) -> None:

@@ -28,6 +28,9 @@ _CHANCE = 8.0  # three standard deviations of the cross-validated share of n ind
 class ErrorMap:
     """Statistics ``(B,)`` of an error in bins of one variable, SI; bins with too few samples are left out."""
 
+    start: Array
+    """Least value of the variable in the bin; it holds what lies from there on and below `end`."""
+    end: Array
     center: Array
     count: Index
     mean: Array
@@ -90,6 +93,13 @@ class Binning:
         starts = np.concatenate(([0], np.cumsum(np.bincount(index, minlength=bins))))
         return cls(values, edges, index, order, starts)
 
+    def reach(self) -> Array:
+        """``(B + 1,)`` between what values the bins lie, with all that belongs to the end bins."""
+        found = np.resize(self.edges, self.starts.size).astype(float)
+        found[0] = min(found[0], float(self.values.min(initial=np.inf)))
+        found[-1] = np.nextafter(max(float(self.edges[-1]), float(self.values.max(initial=-np.inf))), np.inf)
+        return found
+
 
 def independent_samples(error: Array, folds: Index) -> float:
     """How many independent samples an error ``(N,)`` amounts to: of each fold N/(1 + 2·Σρ), ρ until it vanishes.
@@ -114,7 +124,8 @@ def error_map(error: Array, binning: Binning, folds: Index, independent: float |
     """
     independent = independent_samples(error, folds) if independent is None else independent
     rows = []
-    for first, last in zip(binning.starts[:-1], binning.starts[1:], strict=True):
+    ends = binning.reach()
+    for bin_, (first, last) in enumerate(zip(binning.starts[:-1], binning.starts[1:], strict=True)):
         inside = binning.order[first:last]
         e = error[inside]
         known = np.isfinite(e)
@@ -123,13 +134,15 @@ def error_map(error: Array, binning: Binning, folds: Index, independent: float |
             continue
         low, middle, high = np.quantile(e, (0.1, 0.5, 0.9))
         place = float(binning.values[inside][known].mean())
-        rows.append((place, e.size, float(e.mean()), middle, low, high, float(np.sqrt(np.mean(e**2)))))
-    table = np.array(rows, dtype=float).reshape(-1, 7)
+        rows.append(
+            (*ends[bin_ : bin_ + 2], place, e.size, float(e.mean()), middle, low, high, float(np.sqrt(np.mean(e**2))))
+        )
+    table = np.array(rows, dtype=float).reshape(-1, 9)
     known = np.isfinite(error)
     share = cross_validated_share(error[known], binning.index[known], folds[known], binning.starts.size - 1)
-    center, count, mean, median, low, high, rms = table.T
+    start, end, center, count, mean, median, low, high, rms = table.T
     chance = min(1.0, _CHANCE / max(independent, 1.0))
-    return ErrorMap(center, count.astype(np.int64), mean, median, low, high, rms, share, chance)
+    return ErrorMap(start, end, center, count.astype(np.int64), mean, median, low, high, rms, share, chance)
 
 
 def cross_validated_share(error: Array, index: Index, folds: Index, bins: int) -> float:

@@ -37,8 +37,10 @@ def summary(folder: Path) -> dict[str, Any]:
 
 
 def document(folder: Path, whole: bool) -> dict[str, Any]:
-    """The last result of a run."""
+    """The last result of a run, and which ``model_files`` lie beside it."""
     found = _results(folder)[-1]
+    files = sorted(file.name for file in (*folder.glob("model.yaml"), *folder.glob("competing_*.yaml")))
+    found = {**found, "model_files": files}
     if whole:
         return found
     slim: dict[str, Any] = _without(found)
@@ -84,7 +86,7 @@ def figure(folder: Path, name: str) -> str:
 
 
 def samples(folder: Path, channel: str, variable: str, low: float, high: float, points: int) -> dict[str, Any]:
-    """The samples of a comparison at which a variable lies between two values: where they are, and their errors.
+    """The samples of a comparison at which a variable is at least ``low`` and below ``high``: where, and their errors.
 
     :raises WorkbenchError: the run has kept no samples, or not of these.
     """
@@ -101,7 +103,7 @@ def samples(folder: Path, channel: str, variable: str, low: float, high: float, 
             if any(key not in kept for key in keys):
                 raise WorkbenchError(f"{name} has no {channel} over {variable}", "channel")
             time, error, value = (kept[key] for key in keys)
-            inside = (value >= low) & (value <= high) & np.isfinite(error)
+            inside = (value >= low) & (value < high) & np.isfinite(error)
             segments += _segments(name, time, inside)
             rows.append((index, time[inside], error[inside], value[inside]))
     segments.sort(key=lambda s: -s["count"])

@@ -85,7 +85,8 @@ export function diagnosisResult(doc, job) {
       ${fallingSteps(residualSteps(doc))}
       ${added ? nothing : html`<div class="row" style="margin-top:12px">
         ${canApply ? html`<button id="apply" ?disabled=${!operates() || anyRuns()} @click=${() => applyVerdict(job.run)}>Take the model of the verdict</button>` : nothing}
-        <button id="next-experiment" ?disabled=${!operates() || anyRuns()} title="Design the experiment that tells the candidates apart" @click=${() => nextExperiment(job)}>Next experiment</button>
+        <button id="next-experiment" ?disabled=${!operates() || anyRuns() || doc.model_files.length < 2}
+          title=${doc.model_files.length < 2 ? "These records leave one model: there is nothing to tell apart" : "Design the experiment that tells the candidates apart"} @click=${() => nextExperiment(job)}>Next experiment</button>
         ${stale ? html`<span class="soft small">The model has changed since.</span>` : nothing}</div>`}
       ${dataSheet(doc)}${recording(doc)}${findings(doc)}
     </section>
