@@ -158,4 +158,4 @@ def test_a_diagnosis_outlives_its_page_and_ends_when_asked(bench: Any, page: Any
     third = bench.open(tab="diagnose")
     until(third, FINISHES, job)
     third.wait_for_selector("[aria-label=Verdict] .verdict")
-    assert third.locator("[aria-label=Candidates] table.candidates tbody tr").count() > 1
+    third.wait_for_selector("[aria-label=Candidates] table.candidates tbody tr >> nth=5")  # all that it had scored

@@ -19,6 +19,7 @@ BINS = 32
 DIRECTION_EDGES: Array = np.array([-1.5, -0.5, 0.5, 1.5])
 """Of the bins of `directions`."""
 _SMALLEST_BIN = 20
+EDGE_DIGITS = 12  # that a result file keeps
 _BLOCK_SECONDS = 0.5
 _VANISHED = 0.05
 _CHANCE = 8.0  # three standard deviations of the cross-validated share of n independent samples stay below 8/n
@@ -87,6 +88,7 @@ class Binning:
         What lies beyond an end belongs to the end bin.
         """
         edges = adaptive_edges(values) if edges is None else edges
+        edges = np.array([float(f"{edge:.{EDGE_DIGITS}g}") for edge in edges])  # those of the document, to the last bit
         bins = max(edges.size - 1, 1)
         index = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
         order = np.argsort(index, kind="stable")
@@ -94,10 +96,11 @@ class Binning:
         return cls(values, edges, index, order, starts)
 
     def reach(self) -> Array:
-        """``(B + 1,)`` between what values the bins lie, with all that belongs to the end bins."""
+        """``(B + 1,)`` between what values the bins lie; the end bins reach a little beyond all values."""
         found = np.resize(self.edges, self.starts.size).astype(float)
-        found[0] = min(found[0], float(self.values.min(initial=np.inf)))
-        found[-1] = np.nextafter(max(float(self.edges[-1]), float(self.values.max(initial=-np.inf))), np.inf)
+        low, high = min(found[0], float(self.values.min())), max(found[-1], float(self.values.max()))
+        room = 1e-6 * max(high - low, abs(high), abs(low))
+        found[0], found[-1] = low - room, high + room
         return found
 
 
