@@ -72,6 +72,10 @@ def test_a_hidden_effect_is_named_and_added_within_twelve_clicks(page: Any, pict
 def test_the_new_model_runs_beside_the_plant(page: Any, picture: Callable[..., None]) -> None:
     page.evaluate("location.hash = '#/live'")
     page.click("#start-controller")
+    page.click("summary:has-text('Its shape')")
+    cycles = page.locator(".slider:has-text('cycles') input")
+    cycles.evaluate("e => { e.value = e.max; }")  # so that it moves all the time
+    cycles.dispatch_event("input")
     page.click("#start-reference")
     page.select_option("#live-model", label="moog_mcr_m_1002_bench")
     until(page, RESIDUAL, "moog")
@@ -83,6 +87,7 @@ def test_the_new_model_runs_beside_the_plant(page: Any, picture: Callable[..., N
     until(page, RESIDUAL, "add")
     page.wait_for_timeout(STEADY_MS)
     after = page.evaluate(RESIDUAL, "add")
+    assert page.evaluate("workbench.state.bench.reference.phase") == "running", "the piston moves while it is measured"
     picture(page, "live-model-beside")
     print(f"residual of the position {1e3 * before:.3f} mm, with the effect {1e3 * after:.3f} mm")
     assert after < SHRUNK * before

@@ -125,6 +125,7 @@ def test_the_next_experiment_goes_to_its_tab(page: Any, picture: Callable[..., N
     page.evaluate("location.hash = '#/diagnose'")
     page.click("#next-experiment:not([disabled])")
     page.wait_for_selector("[aria-label='Next experiment'] tbody tr")
+    assert all(page.locator("[aria-label='Next experiment'] li").all_inner_texts()), "every movement in words"
     picture(page, "next-experiment")
     page.click("#to-experiment")
     page.wait_for_selector(".plan.chosen:has-text('proposed by a diagnosis')")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from page_steps import drop, until
+from page_steps import drop, hidden_part, until
 from scipy.io import savemat
 
 PAGE = Path(__file__).parents[3] / "ros_ws/src/hydraulic_workbench/hydraulic_workbench/page"
@@ -140,7 +140,7 @@ def test_the_real_bench_asks_and_says_what_is_missing(bench: Any, picture: Calla
     page.click("dialog .primary")
     until(page, "workbench.state.bench.plant.phase === 'failed'")
     said = page.inner_text(".banner[role=alert]")
-    assert "can97" in said and "Traceback" not in said
+    assert "can97" in said and "Traceback" not in said and "[ERROR]" not in said
     picture(page, "real-bench-missing")
     page.evaluate("location.hash = '#/plant'")
     page.click("#stop-plant")
@@ -193,4 +193,6 @@ def test_every_tab_fits_a_phone(bench: Any, picture: Callable[..., None]) -> Non
         wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
         assert wide <= 0, f"{tab}: the page is {wide} px too wide"
         assert page.locator("#stop").is_visible()
+        if tab == "records":
+            assert hidden_part(page, ".scroll:has(table.records)") <= 0, "Diagnose is cut off"
         picture(page, f"{tab}-phone")

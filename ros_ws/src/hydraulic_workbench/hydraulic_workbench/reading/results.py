@@ -15,7 +15,7 @@ from hydraulic_workbench.errors import UnknownError, WorkbenchError
 
 BULKY = ("spectra", "error_growth", "spectrum", "lag", "cross_lag", "autocorrelation",
          "exact_autocorrelation", "cross_correlation", "software", "description")  # fmt: skip
-"""Entries that only figures need; those that the page draws itself stay."""
+"""Entries that only figures need, where they are more than a text; those that the page draws itself stay."""
 SAMPLES = "samples.npz"
 
 
@@ -51,7 +51,7 @@ def document(folder: Path, whole: bool) -> dict[str, Any]:
 
 def _without(value: Any) -> Any:
     if isinstance(value, dict):
-        return {k: _without(v) for k, v in value.items() if k not in BULKY}
+        return {k: _without(v) for k, v in value.items() if k not in BULKY or isinstance(v, str)}
     return [_without(v) for v in value] if isinstance(value, list) else value
 
 

@@ -81,7 +81,8 @@ def references() -> list[dict[str, Any]]:
         own = getattr(trajectory, "__dataclass_fields__", {})
         parameters: list[Any] = [
             {"name": s.name, "value": s.default, "unit": s.unit, "minimum": s.minimum, "maximum": s.maximum,
-             "description": s.description, "live": s.live, "display": display(s.unit), "choices": None}
+             "description": s.description, "live": s.live, "display": display(s.unit), "choices": None,
+             "whole": type(s.default) is int}
             for s in numbers
             if s.name in own
         ]  # fmt: skip

@@ -81,8 +81,8 @@ function field(parameter, change) {
   const outside = parameter.minimum !== null && parameter.minimum !== undefined && parameter.maximum !== null && parameter.maximum !== undefined
     ? `${digits(parameter.minimum * factor, 3)} … ${digits(parameter.maximum * factor, 3)} ${unit}` : "";
   return html`<label class="field slider" title=${[parameter.description, outside].filter(Boolean).join(" · ")}>
-    <span class="row spread"><span>${words(parameter.name)}</span><b>${digits(parameter.value * factor, 4)} ${unit}</b></span>
-    <input type="range" min=${low} max=${high} step=${(high - low) / 200} .value=${String(parameter.value)} ?disabled=${!operates()}
+    <span class="row spread"><span>${words(parameter.name)}</span><b>${parameter.whole ? parameter.value : digits(parameter.value * factor, 4)} ${unit}</b></span>
+    <input type="range" min=${low} max=${high} step=${parameter.whole ? 1 : (high - low) / 200} .value=${String(parameter.value)} ?disabled=${!operates()}
       @input=${(event) => change(parameter, Number(event.target.value))}></label>`;
 }
 

@@ -22,7 +22,7 @@ export function calibrateResult(doc) {
     <p class="verdict ${doc.verdict.level}">${doc.verdict.text}</p>
     ${fallingSteps([{ value: over(doc.fit?.before), title: "before" }, { value: over(doc.fit?.after), title: "after" }])}
     <div class="scroll"><table><thead><tr><th>Parameter</th><th class="number">Before</th><th class="number">After</th><th class="number">± standard error</th><th></th></tr></thead>
-      <tbody>${moved.map((one) => html`<tr><th>${words(one.key)}</th><td class="number">${quantity(one.before, one.unit)}</td><td class="number">${quantity(one.value, one.unit)}</td>
+      <tbody>${moved.map((one) => html`<tr><th>${words(one.key).replace(".", ": ")}</th><td class="number">${quantity(one.before, one.unit)}</td><td class="number">${quantity(one.value, one.unit)}</td>
         <td class="number">${one.standard_error === null ? "–" : quantity(one.standard_error, one.unit, 2)}</td>
         <td>${one.identifiable ? nothing : html`<span class="chip fair">not identifiable</span>`}${one.at_bound ? html`<span class="chip poor">at ${one.at_bound} bound</span>` : nothing}</td></tr>`)}</tbody></table></div></section>`;
 }
