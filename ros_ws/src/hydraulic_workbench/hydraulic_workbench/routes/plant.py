@@ -97,7 +97,14 @@ def _chosen(bench: Bench, kind: str, wanted: dict[str, Any], lockstep: bool) -> 
         name = str(wanted.get("bus") or "bench")
         bus = load_bus(name)  # refuses one that cannot be read
         interface, channel = (str(wanted.get(key) or "") for key in ("interface", "channel"))
-        return Chosen(CAN, f"real bench on {channel or bus.channel}", bus=name, interface=interface, channel=channel, lockstep=False)
+        return Chosen(
+            CAN,
+            f"real bench on {channel or bus.channel}",
+            bus=name,
+            interface=interface,
+            channel=channel,
+            lockstep=False,
+        )
     model = bench.model(wanted.get("model"))
     chosen = Chosen(kind, f"simulator of {model.document()['name']}", model.file, model.id, lockstep=lockstep)
     if kind == SIMULATOR:
