@@ -38,9 +38,10 @@ function figure(run, name) {
   const key = `${run} ${name}`;
   if (!fetched.has(key)) {
     fetched.set(key, null);
-    attempt(() => get(`${base(run)}/figures/${encodeURIComponent(name)}`)).then((found) => { fetched.set(key, found); changed(); });
+    attempt(() => get(`${base(run)}/figures/${encodeURIComponent(name)}`)).then((found) => { fetched.set(key, found || false); changed(); });
   }
   const found = fetched.get(key);
+  if (found === false) return html`<p class="soft">It could not be loaded.</p>`;
   return found ? html`<plotly-figure .figure=${found}></plotly-figure>` : html`<i class="spinner"></i>`;
 }
 
