@@ -130,7 +130,7 @@ def opened(browser: Any, bench: Workbench) -> tuple[Page, float]:
     return page, float(paint) / 1e3
 
 
-def watched(bench: Workbench, page: Page, seconds: float) -> dict[str, float]:
+def watched(bench: Workbench, page: Page, seconds: float) -> dict[str, Any]:
     """Redraws, processor time, samples that are missing, and memory, while the page shows everything."""
     counts = "[workbench.live.redraws, workbench.live.samples]"
     (redraws, samples), begun, used = page.evaluate(counts), time.monotonic(), bench.processor_s()
@@ -151,6 +151,7 @@ def watched(bench: Workbench, page: Page, seconds: float) -> dict[str, float]:
         "lost": bench.state()["health"]["lost"],
         "memory": server[-1],
         "growth": slope(times, server),
+        "by_minute": floor(times, server)[1],
         "script": statistics.median(script[-3:]),
         "script_growth": slope(*floor(times, script)),
     }
@@ -277,6 +278,7 @@ def measured(bench: Workbench, folder: Path, options: argparse.Namespace) -> boo
     ]  # fmt: skip
     for what, found, wanted, good in rows:
         print(f"{'' if good else 'NOT '}{what:60} {found:>12}  {wanted}")
+    print("memory of the server by minute [MB]:", " ".join(f"{mb:.1f}" for mb in seen["by_minute"]))
     for what, turns in (("without a page", without), ("with a page", with_page)):
         text = ", ".join(f"jitter {m:.3f} / {p:.3f} ms, {n} lost" for m, p, n in turns)
         print(f"plant (median / p99) and recorder {what}: {text}")
