@@ -114,6 +114,8 @@ class Writer:
             return f"M[{place.start}:{place.stop}]"
         if argument in {p.name for p in base.PARAMETERS}:
             return self.parameter(argument)
+        if argument == "command" and not slots.SLOTS[effect.slot].per_sample and effect.slot != "loop":
+            return "demand"
         return argument
 
     def slot(self, name: str) -> str:

@@ -90,7 +90,9 @@ class Effect:
     parameters alone, so that the integrator's step can follow it; ``reach`` says how far back [s] its memory must go
     (one value per sample; without it the memory may keep what is long past). ``always_on`` marks base physics. ``wear``
     says what of a machine ages where the effect grows; empty where nothing does.
-    ``alike_without_pressures`` names the family whose members drive and position alone cannot distinguish.
+    ``alike_without_pressures`` names the family whose members drive and position alone cannot distinguish. ``kinds``:
+    of plants in which it can act. ``searched``: whether a diagnosis may find it missing; how a machine is built
+    (a controller inside, a load that was put on) is for the model file to say.
     """
 
     slot: str
@@ -112,6 +114,8 @@ class Effect:
     reach: Callable | None = None
     always_on: bool = False
     wear: str = ""
+    kinds: tuple[str, ...] = ("hydraulic", "mechanical")
+    searched: bool = True
     name: str = ""
 
     def __post_init__(self) -> None:

@@ -11,7 +11,9 @@ pressure_difference = pressure_a - pressure_b
 load_pressure = pressure_a - pressure_b * piston_area_b / piston_area_a
 viscosity = 1.0
 {viscosity}
-spool = command
+demand = command
+{loop}
+spool = demand
 {spool}
 if hydraulic:
     opening = spool
@@ -48,13 +50,17 @@ if hydraulic:
     K[2] = (flow_a - piston_area_a * velocity) / compliance_a
     K[3] = (flow_b + piston_area_b * velocity) / compliance_b
     pressure_rate = max(slope_a / compliance_a, slope_b / compliance_b)
-    drive_part = pressure_a * piston_area_a - pressure_b * piston_area_b
+    actuator_force = pressure_a * piston_area_a - pressure_b * piston_area_b
 else:
     opening = spool
     pressure_supply = 0.0; pressure_tank = 0.0; flow_supply = 0.0; flow_tank = 0.0
     flow_a = 0.0; flow_b = 0.0; volume_a = 0.0; volume_b = 0.0
     K[2] = 0.0; K[3] = 0.0; pressure_rate = 0.0
-    drive_part = drive_force * drive_limit * spool
+    effort = spool
+    {motor}
+    actuator_force = drive_force * drive_limit * effort
+mass = moving_mass
+{inertia}
 bristle_length = {bristle_length}; bristle_time = {bristle_time}
 {bristle}
 turn = 1.0 if velocity >= 0.0 else -1.0
@@ -64,7 +70,7 @@ direction = stick + min(bristle_time * R[{stick_r}], 1.0) * (turn - stick)
 force = 0.0
 {force}
 K[0] = velocity
-acceleration = (drive_part + force) / moving_mass
+acceleration = (actuator_force + force) / mass
 K[1] = acceleration
 {dynamics}
 """
@@ -96,7 +102,7 @@ def rhs(now, S, command, on, P, hydraulic, K, R, G, AUX):
     {switches1}
     {rhs1}
     AUX[0] = spool; AUX[1] = pressure_supply; AUX[2] = opening; AUX[3] = pressure_rate
-    AUX[4] = flow_a; AUX[5] = flow_b; AUX[6] = force; AUX[7] = drive_part; AUX[8] = flow_supply
+    AUX[4] = flow_a; AUX[5] = flow_b; AUX[6] = force; AUX[7] = actuator_force; AUX[8] = flow_supply
     AUX[9] = direction; AUX[10] = pressure_tank
 
 

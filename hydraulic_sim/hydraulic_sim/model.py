@@ -200,10 +200,12 @@ class Model:
         if self.kind not in KINDS:
             raise ModelError(f"{self._label}: plant is {self.kind!r}; allowed: {', '.join(KINDS)}")
         self.check_laws()
-        if self.kind == "mechanical":
-            for name in self.effects:
-                if slots.SLOTS[self._effect(name).slot].hydraulic:
-                    raise ModelError(f"{self._label}: {name} acts on the oil, which a mechanical plant does not have")
+        for name in self.effects:
+            effect = self._effect(name)
+            if self.kind == "mechanical" and slots.SLOTS[effect.slot].hydraulic:
+                raise ModelError(f"{self._label}: {name} acts on the oil, which a mechanical plant does not have")
+            if self.kind not in effect.kinds or (slots.SLOTS[effect.slot].mechanical and self.kind == "hydraulic"):
+                raise ModelError(f"{self._label}: {name} is an effect of a mechanical plant; this one is {self.kind}")
         needed = [p.name for p in base.PARAMETERS if p.required]
         if self.kind == "mechanical":
             needed = ["moving_mass", "drive_force"]

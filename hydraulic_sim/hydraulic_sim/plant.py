@@ -23,6 +23,7 @@ LONGEST_MEMORY = 256  # samples of past drive that effects on the command may ne
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 FIT_STEP, FIT_REFINEMENT = 1e-3, 2.2  # half as fine: off by a hundredth of the sensors' noise on all benches tried
 FIRM = 5.0  # times the oil's natural frequency: a contact in which the supply leaves 1e-4 of the stroke at most
+YIELDS = 1e-4  # of the stroke
 HEAVY = 1e6
 _OF_FORCES = ("moving_mass", "drive_force", "bristle_length", "bristle_time")  # base parameters of forces alone
 _READINGS = 4  # of the outputs, the first: what sensors read
@@ -84,10 +85,13 @@ class Plant:
         End stops that are far stiffer than the oil would ask for short steps everywhere, and are softer.
         """
         key = "end_stop.stiffness"
-        if model.kind == "hydraulic" and not model.entry(key).free:
+        if not model.entry(key).free:
             values = {k: model.value(k) for k in model.keys()}  # noqa: SIM118, a method of the model
-            enough = values["moving_mass"] * (FIRM * rates.oil(values)) ** 2
-            if values[key] > enough:
+            if model.kind == "hydraulic":
+                enough = values["moving_mass"] * (FIRM * rates.oil(values)) ** 2
+            else:  # the full force goes as deep as the supply does there
+                enough = abs(values["drive_force"] * values["drive_limit"]) / (YIELDS * values["stroke"])
+            if values[key] > enough >= model.parameter(key).bounds[0]:
                 model = model.with_values({key: enough})
         return cls(model, FIT_STEP, FIT_REFINEMENT)
 
@@ -145,6 +149,20 @@ class Plant:
     def value(self, key: str) -> float:
         """The value in use of a parameter [SI]."""
         return float(self._parameters[self.layout.parameters[key]])
+
+    @property
+    def closes_a_loop(self) -> bool:
+        """Whether a controller inside the actuator follows a commanded position: then the drive is that command."""
+        return any(e.slot == "loop" for e in self._active)
+
+    @property
+    def mass(self) -> float:
+        """All that moves with the piston [kg]: moving_mass and what effects put on."""
+        total = self.value("moving_mass")
+        for e in self._active:
+            if e.slot == "inertia":
+                total += e.kernel(*(self.value(f"{e.name}.{name}") for name in arguments(e.kernel)))
+        return total
 
     def initial_state(
         self,
@@ -287,6 +305,8 @@ class Plant:
         Plants of one library with the same path propagate a record to the same inner states.
         """
         inner = self._inner_effects
+        if self.closes_a_loop:
+            return None
         alone = {"command", "t", *PER_SAMPLE}
         for e in inner:
             own = {p.name for p in e.parameters} | {s.name for s in e.states}

@@ -1,8 +1,8 @@
 """Where effects act: the stages of the plant, in the order in which they are evaluated.
 
 Per sample (the drive is held over a sample): *command* turns the drive into the demanded opening; *position
-sensor* and *pressure sensor* turn states into readings. Within the right-hand side: viscosity → spool → opening
-→ lands → supply → flow → compliance → force.
+sensor* and *pressure sensor* turn states into readings. Within the right-hand side: viscosity → loop → spool →
+opening → lands → supply → flow → compliance → force; in a mechanical plant viscosity → loop → spool → motor → force.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ class Slot:
 
     ``kind``: "law" (one effect at a time, with an ideal default), "chain" (each effect takes the stage's signal and
     returns it changed) or "sum" (contributions add). ``returns`` names what a kernel returns. ``subsystem`` is the part
-    of the bench it belongs to. ``hydraulic`` marks a stage that a mechanical plant does not have.
+    of the bench it belongs to. ``hydraulic`` marks a stage that a mechanical plant does not have, ``mechanical`` one
+    that only such a plant has.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Slot:
     what: str
     per_sample: bool = False
     hydraulic: bool = False
+    mechanical: bool = False
 
 
 SLOTS: dict[str, Slot] = {
@@ -33,6 +35,8 @@ SLOTS: dict[str, Slot] = {
     for s in (
         Slot("command", "chain", ("command",), "valve", "drive to demanded opening, −1…1", per_sample=True),
         Slot("viscosity", "chain", ("viscosity",), "fluid", "factor on all viscous terms"),
+        Slot("loop", "law", ("demand",), "valve",
+             "command and motion to the demanded opening; ideal: the command is the demand (no controller inside)"),
         Slot("spool", "law", ("spool",), "valve", "demanded opening to spool position; ideal: equal"),
         Slot("opening", "chain", ("opening",), "valve", "spool position to effective opening", hydraulic=True),
         Slot("lands", "law", ("land_pa", "land_at", "land_pb", "land_bt"), "valve",
@@ -44,6 +48,8 @@ SLOTS: dict[str, Slot] = {
              hydraulic=True),
         Slot("compliance", "sum", ("compliance_a", "compliance_b"), "fluid",
              "capacity [m³/Pa] of the chambers beside that of the plain oil", hydraulic=True),
+        Slot("motor", "chain", ("effort",), "valve", "demand to the share of the motor's full force", mechanical=True),
+        Slot("inertia", "sum", ("mass",), "force", "mass that moves with the piston besides moving_mass"),
         Slot("bristle", "law", ("bristle_length", "bristle_time"), "force",
              "how the direction of dry friction follows the motion; ideal: within microns"),
         Slot("force", "sum", ("force",), "force", "force on the piston besides the pressures"),
@@ -64,7 +70,7 @@ SIGNALS: dict[str, tuple[int, str]] = {
     "pressure_difference": (0, "p_A − p_B [Pa]"),
     "load_pressure": (0, "p_A − p_B·A_B/A_A, the force of the pressures over area A [Pa]"),
     "viscosity": (_ORDER["spool"], "factor on viscous terms, 1 at the start [-]"),
-    "command": (0, "demanded opening, −1…1 [-]"),
+    "command": (0, "demanded opening, −1…1, behind the loop where one is closed [-]"),
     "spool": (_ORDER["opening"], "spool position, −1…1 [-]"),
     "opening": (_ORDER["opening"], "effective opening [-]"),
     "pressure_supply": (_ORDER["ripple"], "supply pressure at the valve [Pa]"),
@@ -73,6 +79,7 @@ SIGNALS: dict[str, tuple[int, str]] = {
     "flow_tank": (_ORDER["flow"], "flow returned to the tank [m³/s]"),
     "volume_a": (_ORDER["compliance"], "oil volume of chamber A [m³]"),
     "volume_b": (_ORDER["compliance"], "oil volume of chamber B [m³]"),
+    "actuator_force": (_ORDER["inertia"], "force of the pressures or of the motor [N]"),
     "acceleration": (len(SLOTS), "piston acceleration [m/s²]"),
     "direction": (_ORDER["force"], "direction of dry friction, −1…1 [-]"),
 }

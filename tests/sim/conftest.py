@@ -28,9 +28,9 @@ def bare() -> Model:
 
 @pytest.fixture(scope="session")
 def everything(bare: Model) -> Model:
-    """The same with every effect on, at the library's defaults."""
+    """The same with every effect on that a diagnosis may find on it, at the library's defaults."""
     for name, effect in registry.library().items():
-        if not effect.always_on:
+        if not effect.always_on and effect.searched and bare.kind in effect.kinds:
             bare = bare.with_effect(name)
     return bare
 

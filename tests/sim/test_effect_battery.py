@@ -21,7 +21,8 @@ from hydraulic_sim.trajectory import Trajectory
 
 Array = np.ndarray
 
-EFFECTS = list(library().values())
+# Those of mechanical plants alone have tests of their own (test_servo_effects.py).
+EFFECTS = [e for e in library().values() if "hydraulic" in e.kinds and e.searched]
 SWITCHED = [e for e in EFFECTS if not e.always_on]
 SEEN = ("position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool", "opening")
 DT = 1e-3

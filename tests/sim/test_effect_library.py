@@ -22,7 +22,8 @@ VOCABULARY = (
     "valve_hysteresis", "valve_gain_asymmetry", "valve_gain_curve", "valve_flow_saturation", "spool_dynamics",
     "spool_rate_limit", "command_delay", "supply_droop", "return_back_pressure", "pump_ripple", "sensor_offset",
     "sensor_scale", "sensor_nonlinearity", "sensor_lag", "sensor_delay", "sensor_backlash", "sensor_quantisation",
-    "pressure_offset",
+    "pressure_offset", "position_loop", "motor_damping", "supply_sag", "force_limit", "load_dependent_friction",
+    "gravity_pendulum", "payload",
 )  # fmt: skip
 
 EVERY = pytest.mark.parametrize("effect", library().values(), ids=list(library()))
@@ -95,4 +96,5 @@ def test_keys_of_a_model_are_those_of_its_effects(bare: Model, everything: Model
     always = {f"{e.name}.{p.name}" for e in library().values() if e.always_on for p in e.parameters}
     expected = {p.name for p in base.PARAMETERS} | always
     assert set(bare.keys()) == expected
-    assert set(everything.keys()) == expected | {f"{e.name}.{p.name}" for e in library().values() for p in e.parameters}
+    on = (library()[name] for name in everything.effects)
+    assert set(everything.keys()) == expected | {f"{e.name}.{p.name}" for e in on for p in e.parameters}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -74,7 +75,9 @@ def test_named_records_are_for_validation_whole(model) -> None:
 
 def test_candidates_are_the_library_without_what_is_on_or_cannot_act(model) -> None:
     names = {e.name for e in candidates(model)}
-    assert names == {e.name for e in model.library.values() if not e.always_on} - set(model.effects)
+    acting = {e.name for e in model.library.values() if "hydraulic" in e.kinds and e.searched and not e.always_on}
+    assert names == acting - set(model.effects)
+    assert "load_dependent_friction" not in names and "payload" not in names
     assert not {"supply_droop"} & {e.name for e in candidates(model.with_effect("supply_droop"))}
 
 
@@ -135,6 +138,17 @@ def state(model, total: float, refits: dict[str, float]) -> SearchState:
     """A state with that sum of squares, and those of its refits."""
     found = [CandidateRefit(name, None, at(left)) for name, left in refits.items()]  # type: ignore[arg-type]
     return SearchState(model, None, at(total), [], found)  # type: ignore[arg-type]
+
+
+def noisy(noise: float) -> Split:
+    """A record whose one channel has that noise."""
+    return Split([SimpleNamespace(noise=[SimpleNamespace(innovation=noise)], loudness=np.ones((3, 1)))], [])  # type: ignore[list-item]
+
+
+def as_recorded(model, total: float, noise: float | None = None) -> SearchState:
+    """A state with that sum of squares over that noise (None: of no record at all)."""
+    judged = Split([], []) if noise is None else noisy(noise)
+    return replace(state(model, total, {}), linearisation=SimpleNamespace(split=judged))  # type: ignore[arg-type]
 
 
 def at(total: float) -> Misfit:
@@ -270,10 +284,20 @@ def test_a_search_that_is_ended_early_gives_the_best_so_far(model, moment: str) 
 
 def test_what_a_fault_of_the_recording_explains_is_explained(model) -> None:
     base = state(model, 3000 * 1.04, {})
-    found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
+    found = SearchResult(model, noisy(1.0), FitSettings(), base, base, {}, {})
     assert found.before is base.misfit and found.unexplained_share == pytest.approx(1.0)
-    found = replace(found, as_recorded=at(3000 * 5.0))
-    assert found.before is found.as_recorded and found.unexplained_share < 0.01
+    found = replace(found, as_recorded=as_recorded(model, 3000 * 5.0, 1.0))
+    assert found.before == at(3000 * 5.0) and found.unexplained_share < 0.01
+
+
+def test_what_was_left_before_is_told_over_the_noise_of_the_end(model) -> None:
+    """A fault of the recording that is mended may show a smaller noise: then more of it was left before."""
+    base = state(model, 3000 * 25.0, {})
+    found = SearchResult(model, noisy(0.5), FitSettings(), base, base, {}, {})
+    assert found.before_over_noise is base.misfit
+    found = replace(found, as_recorded=as_recorded(model, 3000 * 16.0, 1.0))
+    assert found.before_over_noise.rms_validation == pytest.approx(8.0)
+    assert found.before_over_noise.rms_fit == pytest.approx(8.0) and found.before.rms_fit == pytest.approx(4.0)
 
 
 def test_a_small_remainder_does_not_take_back_what_is_said_of_the_recording(model) -> None:
@@ -281,9 +305,9 @@ def test_a_small_remainder_does_not_take_back_what_is_said_of_the_recording(mode
     found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
     assert verdict.kind_of(found, tied=False) == verdict.OUTSIDE
     late = RecordingFault(HYPOTHESES[0], 2e-3, 1e-5, 5000.0)
-    found = replace(found, faults=(late,), as_recorded=at(3000 * 5.0))
+    found = replace(found, faults=(late,), as_recorded=as_recorded(model, 3000 * 5.0))
     assert verdict.kind_of(found, tied=False) == verdict.RECORDING
-    much = replace(found, as_recorded=at(3000 * 1.5))
+    much = replace(found, as_recorded=as_recorded(model, 3000 * 1.5))
     assert verdict.kind_of(much, tied=False) == verdict.OUTSIDE
     assert late.text in verdict.sentences(much, verdict.judge(much), []), "it is said all the same"
     much = replace(much, moved=(Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0),))

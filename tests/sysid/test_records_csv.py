@@ -283,3 +283,17 @@ def test_a_path_that_holds_no_record_is_refused(tmp_path: Path, name: str) -> No
     (tmp_path / "empty").mkdir()
     with pytest.raises(FileError, match=name):
         read_records(tmp_path / name)
+
+
+def test_lines_before_a_table_and_ragged_rows_of_a_logger(tmp_path):
+    path = tmp_path / "log.txt"
+    path.write_text("Version:  2\nRate:  1000\nNo, CH0, CH1, Events\n1, 0.5, 2.0, Start\n2, 0.6, 2.5\n3, 0.7, 3.0\n")
+    columns = {"time": {"dt": 0.001}, "channels": {"drive": {"column": "CH1", "unit": "V"},
+                                                   "position": {"column": "CH0", "unit": "mm"}}}  # fmt: skip
+    (record,) = read_records(path, parse_column_map({**columns, "skip": 2, "ragged": True}))
+    assert record["drive"] == pytest.approx([2.0, 2.5, 3.0])
+    assert record["position"] == pytest.approx([0.5e-3, 0.6e-3, 0.7e-3])
+    with pytest.raises(RecordError, match="cells"):
+        read_records(path, parse_column_map({**columns, "skip": 2}))
+    with pytest.raises(RecordError, match="skip"):
+        parse_column_map({**columns, "skip": -1})

@@ -21,7 +21,7 @@ from hydraulic_sysid.data.records import Record, RecordError, read_records, save
 from hydraulic_sysid.data.records.formats import SUFFIXES
 from hydraulic_sysid.verbs import convert
 
-KINDS = [s for s in SUFFIXES if not s.startswith(".tsv")]
+KINDS = [s for s in SUFFIXES if not s.startswith((".tsv", ".txt"))]
 
 
 def record(count: int = 300, seed: int = 4) -> Record:

@@ -9,6 +9,7 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.model import Model
+from hydraulic_sim.typical import typical
 
 Priors = Mapping[str, tuple[float, float]]
 """What is known of parameters beforehand: key → mean and standard deviation [SI]."""
@@ -18,13 +19,15 @@ _AT_BOUND = 1e-6  # distance from a bound, of the scale
 
 
 def scale(model: Model, key: str) -> float:
-    """The size of a parameter: of its value, or of the library's default where that is larger.
+    """The size of a parameter: of its value, or of what is typical of the plant where that is larger.
 
-    Where both are 0, as an angle may be, a hundredth of its range.
+    Where the library knows no typical value, as of a mass, its value alone; where both are 0, as an angle may be, a
+    hundredth of its range.
     """
     parameter = model.parameter(key)
     low, high = parameter.bounds
-    return max(abs(model.value(key)), abs(parameter.default)) or 0.01 * (high - low)
+    usual = 0.0 if parameter.required else abs(typical(model, parameter))
+    return max(abs(model.value(key)), usual) or 0.01 * (high - low)
 
 
 def bounded(model: Model) -> Model:

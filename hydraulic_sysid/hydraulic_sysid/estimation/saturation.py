@@ -20,6 +20,8 @@ from .noise import resolution, robust_noise_std
 AROUND = 31  # samples over which the share at the end is taken
 SHARE = 0.1  # of them at the end, from which the mean of the noise is bent
 PILE = 20  # samples at the end at least, and more than within one standard deviation below
+LEVEL = 1e-9  # of the range: levels that are nearer differ by rounding
+FEWEST_LEVELS = 3  # steps between levels, from which they are a sensor's
 FLICKERS = 0.5  # share of samples equal to the one before, below which noise shows that a channel is alive
 NEAR = 0.01  # of the range, within which a signal rests at its end
 RESTS = 1000  # samples of such a rest at least
@@ -44,11 +46,24 @@ def _piled(y: Array) -> Mask:
     at = y == end
     same = (np.diff(y) == 0.0) & ~at[1:]
     noise = robust_noise_std(y[~at]) if (~at).sum() >= AROUND else 0.0
-    if noise < resolution(y) or same.sum() >= FLICKERS * max((~at).sum(), 1):
+    if noise < max(resolution(y), _between_levels(y)) or same.sum() >= FLICKERS * max((~at).sum(), 1):
         return np.zeros(y.size, dtype=bool)  # too little noise to tell a pile from a signal that rests
     if at.sum() < max(PILE, int(((y > end - noise) & ~at).sum())):
         return np.zeros(y.size, dtype=bool)
     return np.asarray(uniform_filter1d(at.astype(float), AROUND) >= SHARE)
+
+
+def _between_levels(y: Array) -> float:
+    """The least step between levels that a signal keeps for some samples: a sensor's step, seen through resampling.
+
+    Samples between two that are interpolated hide it elsewhere. 0 where there are too few such levels.
+    """
+    still = np.diff(y) == 0.0
+    kept = y[2:][still[1:] & still[:-1]]
+    levels = np.unique(kept)
+    steps = np.diff(levels)
+    steps = steps[steps > LEVEL * float(np.ptp(y))]
+    return float(steps.min()) if steps.size >= FEWEST_LEVELS else 0.0
 
 
 def _cut_off(y: Array) -> Mask:

@@ -173,7 +173,7 @@ class Shooting:
         return list(_workers(processors.usable()).map(function, items))
 
     def _residual(self, plant: Plant, i: int, states: Array, inner: Inner | None = None) -> Array:
-        segments = self.segments[i]
+        segments, plant = self.segments[i], self._beside(plant, i)
         run = self._run(plant, i, states, inner)
         off = (self.initial_states[i] - states)[:, segments.free] / segments.prior_std
         if segments.tracked:
@@ -191,7 +191,7 @@ class Shooting:
     def _run(
         self, plant: Plant, i: int, states: Array, inner: Inner | None = None, drive: Array | None = None
     ) -> Array:
-        segments = self.segments[i]
+        segments, plant = self.segments[i], self._beside(plant, i)
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.record["drive"] if drive is None else drive
         run = plant.predict(
@@ -201,7 +201,7 @@ class Shooting:
 
     def _inner(self, plant: Plant, i: int) -> Inner:
         """States that no sensor sees, propagated along the record up to each segment."""
-        found, segments = Inner([], np.empty(0), None), self.segments[i]
+        found, segments, plant = Inner([], np.empty(0), None), self.segments[i], self._beside(plant, i)
         if plant.has_inner_states:
             measured = segments.smoothed.shape[1]
             columns = [k for k, name in enumerate(plant.state_names) if k >= measured and name != "stick"]
@@ -223,6 +223,11 @@ class Shooting:
             known = plant.track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
             self._known[i, path] = known
         return known
+
+    def _beside(self, plant: Plant, i: int) -> Plant:
+        """The plant with what record ``i`` states of the machine."""
+        settings = self.segments[i].record.settings
+        return plant.with_parameters(settings) if settings else plant
 
     def _projection(self, plant: Plant, i: int, states: Array) -> Projection:
         segments, inner = self.segments[i], self._inner(plant, i)

@@ -25,7 +25,7 @@ examples:
   python -m hydraulic_sysid convert --record logs --columns my_map.yaml --to bag --out bags
 """
 BAG = "bag"
-KINDS = (*(suffix[1:] for suffix in SUFFIXES), BAG)
+KINDS = (*(suffix[1:] for suffix in SUFFIXES if not suffix.startswith(".txt")), BAG)  # .txt: of loggers, read alone
 
 
 def main(argv: list[str] | None = None) -> int:

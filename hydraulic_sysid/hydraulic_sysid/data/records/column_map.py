@@ -2,14 +2,17 @@
 
 A map is a YAML file::
 
-    time: {column: t, unit: s}           # or {dt: 0.02}; irregular: error | resample | split
+    time: {column: t, unit: s}           # or {dt: 0.02}; irregular: error | resample (to step: 0.005) | split
     channels:
       drive: {column: u, unit: V}        # by its name in the header (MAT: the variable) …
       position: {column: 3, unit: mm, scale: 20.0, offset: -100.0, sign: -1}    # … or its number, from 1
       pressure_b: null                   # absent, as a channel that is not named
+      # held: false    resampled by straight lines, though a drive; true: kept until the next sample, though no drive
     extra:
       speed_signal: {column: 4, unit: V} # a channel of its own, for which no SI unit is known
     header: false                        # header, delimiter and decimal are found out where they are left out
+    skip: 6                              # lines of a text file before its table
+    ragged: true                         # rows may have more or fewer cells than the header (marks of a logger)
     notes: Where the numbers come from.
 
 ``records: {left: {…}, right: {…}}`` in place of ``channels`` makes several records of one file. A map with neither
@@ -19,16 +22,35 @@ channel in other files of a set, as of a transducer that was moved, ``files`` ha
     files:
       "*_pA_*": {pressure_a: {column: p, unit: MPa}}
       "*_pB_*": {pressure_b: {column: p, unit: MPa}}
+
+Cells that are lists have their numbers as ``positions[2]``, the second. ``file`` takes a column from another file of
+the same folder, read at the stamps of the first; such a record is called after the folder::
+
+      position: {column: "positions[2]", unit: rad, file: state_motor.csv}
+
+What a record states of the machine itself, a load that was put on or a gain that was set, is said under ``settings``,
+by the key of the model's parameter: a number [SI], or a column. Where that changes, another record begins::
+
+    settings:
+      payload.mass: {column: mass, scale: 0.0225}
+      position_loop.active: {column: torque_enable}
+
+A rotary axis is described at a radius of 1 m: an angle (rad, deg) counts as the arc in m, its speed (rad/s) in m/s, a
+torque (N*m) as the force in N. Where the actuator has a position controller of its own the drive is its command: an
+angle counts as so many volts, and so does a position with ``command: position`` beside its unit (else mm is no drive)::
+
+      drive: {column: goal, unit: mm, command: position}
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from importlib import resources
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from hydraulic_interfaces.errors import one_line
@@ -36,6 +58,9 @@ from hydraulic_sysid.data.errors import ColumnMapError
 from hydraulic_sysid.data.records.channels import CHANNELS, TIME, allowed, si_unit
 
 IRREGULAR = ("error", "resample", "split")
+_AT_ONE_METRE = {"m": ("rad",), "m/s": ("rad/s",), "N": ("N*m",), "V": ("rad",)}
+"""What counts as a channel's unit too: a rotary axis at a radius of 1 m, and a position that is the command."""
+_ANGLE = re.compile(r"rad|deg|rev|turn")
 
 
 @dataclass(frozen=True)
@@ -54,6 +79,9 @@ class Column:
     sign: int = 1
     scale: float = 1.0
     offset: float = 0.0
+    file: str | None = None
+    held: bool | None = None
+    """Whether it keeps its value until the next sample, where that is not as of every such channel (`HELD`)."""
 
     def si(self, numbers: Any) -> Any:
         """Numbers of the file in SI."""
@@ -67,7 +95,8 @@ class ColumnMap:
     ``units`` are those of the channels that are not in `CHANNELS`. Either ``time`` is a column or ``dt`` is the
     period in seconds. ``irregular`` says what to do with stamps that are not even: refuse them, resample
     (interpolate on the even grid) or split into several records. ``header``: None looks for itself; ``delimiter``
-    and ``decimal`` too. ``files``: what files of such a name have besides, by pattern; see `for_file`.
+    and ``decimal`` too. ``files``: what files of such a name have besides, by pattern; see `for_file`. Of a text file
+    ``skip`` lines are left out, and rows of a ``ragged`` one differ in length.
     """
 
     parts: Mapping[str, Mapping[str, Column]]
@@ -81,6 +110,16 @@ class ColumnMap:
     name: str = ""
     notes: Sequence[str] = field(default_factory=tuple)
     files: Mapping[str, Mapping[str, Column]] = field(default_factory=dict)
+    settings: Mapping[str, float | Column] = field(default_factory=dict)
+    step: float | None = None
+    """Period [s] to resample to, where it is not the median of the stamps'."""
+    skip: int = 0
+    ragged: bool = False
+
+    @property
+    def several_files(self) -> bool:
+        """Whether a record's columns stand in more than one file."""
+        return any(column.file for part in self.parts.values() for column in part.values())
 
     def for_file(self, name: str) -> ColumnMap:
         """The map of a file of this name: with what ``files`` says of it.
@@ -133,7 +172,8 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
 
     :raises ColumnMapError: contents that mean nothing; the text names the key and what is allowed.
     """
-    keys = ("time", "channels", "extra", "records", "files", "header", "delimiter", "decimal", "notes")
+    keys = ("time", "channels", "extra", "records", "files", "settings", "header", "delimiter", "decimal",
+            "skip", "ragged", "notes")  # fmt: skip
     top = _mapping(document, where, keys)
     if "channels" in top and "records" in top:
         raise ColumnMapError(f"{where}: has both 'channels' and 'records' (several groups of channels); one is allowed")
@@ -153,10 +193,14 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
     for name, part in parts.items():
         if not part and not files:
             raise ColumnMapError(f"{where}: {f'records.{name}' if name else 'channels'} maps no channel")
-    time = _mapping(top.get("time", {}), f"{where}: time", ("column", "unit", "scale", "dt", "irregular"))
+    time = _mapping(top.get("time", {}), f"{where}: time", ("column", "unit", "scale", "dt", "irregular", "step"))
     if ("dt" in time) == ("column" in time) and (parts or "dt" in time):
         raise ColumnMapError(f"{where}: time needs either 'column' or 'dt' (the period in seconds)")
     irregular = _choice(time.get("irregular", "error"), f"{where}: time.irregular", IRREGULAR)
+    step = None if "step" not in time else _number(time["step"], f"{where}: time.step")
+    if step is not None and (irregular != "resample" or step <= 0.0):
+        raise ColumnMapError(f"{where}: time.step is {step:g} s with irregular: {irregular}; it must be positive, and "
+                             "goes with irregular: resample")  # fmt: skip
     dt, column = None, None
     if "dt" in time:
         dt = _number(time["dt"], f"{where}: time.dt")
@@ -181,6 +225,10 @@ def parse_column_map(document: Any, where: str = "column map") -> ColumnMap:
         where,
         tuple(notes),
         files,
+        _settings(top.get("settings", {}), f"{where}: settings"),
+        step,
+        skip=_count(top.get("skip", 0), f"{where}: skip"),
+        ragged=_choice(top.get("ragged", False), f"{where}: ragged", (True, False)),
     )
 
 
@@ -246,8 +294,21 @@ def _extra(document: Any, where: str) -> dict[str, Column]:
     return {name: _column(entry, None, f"{where}.{name}") for name, entry in entries.items()}
 
 
+def _settings(document: Any, where: str) -> dict[str, float | Column]:
+    found: dict[str, float | Column] = {}
+    for key, entry in _mapping(document, where).items():
+        if not isinstance(key, str) or not all(part.isidentifier() for part in key.split(".")):
+            raise ColumnMapError(f"{where}: {key!r} is no parameter's key, such as moving_mass or payload.mass")
+        if isinstance(entry, Mapping):
+            _mapping(entry, f"{where}.{key}", ("column", "sign", "scale", "offset"))
+            found[key] = _column({**entry, "unit": "1"}, None, f"{where}.{key}")
+        else:
+            found[key] = _number(entry, f"{where}.{key}")
+    return found
+
+
 def _column(document: Any, quantity: str | None, where: str) -> Column:
-    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset"))
+    entry = _mapping(document, where, ("column", "unit", "sign", "scale", "offset", "held", "file", "command"))
     if "column" not in entry:
         raise ColumnMapError(f"{where}: 'column' is missing (a name in the header, or a number from 1)")
     column = entry["column"]
@@ -262,8 +323,16 @@ def _column(document: Any, quantity: str | None, where: str) -> Column:
         raise ColumnMapError(f"{where}: 'unit' is {entry.get('unit')!r}, a text is needed; {wanted}")
     unit = entry["unit"]
     offset = _number(entry.get("offset", 0.0), f"{where}.offset")
-    factors = (1.0, 0.0) if quantity is None else _si_factors(unit, quantity, where)
-    return Column(column, unit, *factors, sign, scale, offset)
+    commanded = _choice(entry.get("command"), f"{where}.command", ("position", None)) is not None
+    if commanded and (quantity is None or si_unit(quantity) != "V"):
+        raise ColumnMapError(f"{where}.command: position is said of a drive or a command alone")
+    position = "position" if commanded and not _ANGLE.search(unit) else quantity
+    factors = (1.0, 0.0) if position is None else _si_factors(unit, position, where)
+    held = _choice(entry.get("held"), f"{where}.held", (True, False, None))
+    file = entry.get("file")
+    if file is not None and (not isinstance(file, str) or not file or PurePath(file).name != file):
+        raise ColumnMapError(f"{where}.file is {file!r}, must be the name of a file in the same folder")
+    return Column(column, unit, *factors, sign, scale, offset, file, held)
 
 
 def _si_factors(unit: str, quantity: str, where: str) -> tuple[float, float]:
@@ -271,16 +340,21 @@ def _si_factors(unit: str, quantity: str, where: str) -> tuple[float, float]:
     wanted = si_unit(quantity)
     if unit == wanted:
         return 1.0, 0.0
+    plain = unit.replace("_per_", "/").replace("_", " ")
     # Loaded only where a unit is to be converted: pint takes a good part of a second.
     from hydraulic_sim.errors import ModelError
     from hydraulic_sim.units import conversion
 
     if not unit.strip():
         raise ColumnMapError(f"{where}: no unit; expected one that converts to {wanted}")
-    try:
-        return conversion(unit.replace("_per_", "/").replace("_", " "), wanted)
-    except ModelError:
-        raise ColumnMapError(f"{where}: unit {unit!r} does not convert to {wanted}") from None
+    for meant in (wanted, *_AT_ONE_METRE.get(wanted, ())):
+        if meant.startswith("rad") and _ANGLE.search(plain) is None:  # a plain number is no angle
+            continue
+        try:
+            return conversion(plain, meant)
+        except ModelError:
+            continue
+    raise ColumnMapError(f"{where}: unit {unit!r} does not convert to {wanted}")
 
 
 def _mapping(document: Any, where: str, keys: Sequence[str] | None = None) -> Mapping[str, Any]:
@@ -296,6 +370,12 @@ def _number(value: Any, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise ColumnMapError(f"{where} is {value!r}, must be a finite number")
     return float(value)
+
+
+def _count(value: Any, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ColumnMapError(f"{where} is {value!r}, must be a number of lines, 0 or more")
+    return value
 
 
 def _choice(value: Any, where: str, choices: Sequence[Any]) -> Any:

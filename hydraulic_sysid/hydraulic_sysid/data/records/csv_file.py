@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import gzip
 import io
+import json
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,7 +20,8 @@ from hydraulic_sysid.data.records.channels import TIME_UNIT
 from hydraulic_sysid.data.records.column_map import ColumnMap, column_of_header, named_columns
 from hydraulic_sysid.data.records.record import Record
 
-SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz")
+SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz")
+_ELEMENT = re.compile(r"(.+)\[([1-9]\d*)\]")  # of a column whose cells are lists
 _GZIP_MAGIC = b"\x1f\x8b"
 
 
@@ -48,7 +51,8 @@ class CsvTable:
         self.path = path
         self.description: Mapping[str, Any] = {}
         lines = _text(path).splitlines()
-        rows = [number for number, line in enumerate(lines, 1) if line and not line.isspace()]
+        skip = columns.skip if columns else 0
+        rows = [number for number, line in enumerate(lines, 1) if number > skip and line and not line.isspace()]
         if len(rows) != len(lines):
             lines = [lines[number - 1] for number in rows]
         # A comment of '#' lines may stand before the table.
@@ -71,7 +75,8 @@ class CsvTable:
             raise FileError(path, f"{len(lines)} rows of numbers", expected="at least two")
         self._rows, self._lines = rows, lines
         self.width = len(cells)
-        self._check_ragged()
+        if not (columns and columns.ragged):
+            self._check_ragged()
         decimal = columns.decimal if columns else None
         if decimal is None:
             commas = self._delimiter != "," and any("," in line for line in lines)
@@ -105,8 +110,13 @@ class CsvTable:
         return columns
 
     def numbers(self, column: str | int) -> Array:
-        """``(N,)`` numbers of a column; a `FileError` names row and column of a cell that is no number."""
+        """``(N,)`` numbers of a column; a `FileError` names row and column of a cell that is no number.
+
+        Of cells that are lists, ``name[2]`` is the second number.
+        """
         index = self._index(column)
+        if isinstance(column, str) and column not in self.names:
+            return self._elements(index, int(_ELEMENT.fullmatch(column)[2]))  # type: ignore[index]
         if self._numbers is None:
             try:
                 self._numbers = self._parse(None)
@@ -126,6 +136,8 @@ class CsvTable:
     def label(self, column: str | int) -> str | int:
         """Name in the header where there is one, else the number counted from 1."""
         index = self._index(column)
+        if isinstance(column, str):
+            return column
         return self.names[index] if self.names else index + 1
 
     def _cells(self, line: str) -> list[str]:
@@ -148,6 +160,9 @@ class CsvTable:
 
     def _index(self, column: str | int) -> int:
         if isinstance(column, str):
+            element = _ELEMENT.fullmatch(column)
+            if column not in self.names and element and element[1] in self.names:
+                return list(self.names).index(element[1])
             if column not in self.names:
                 there = ", ".join(self.names) if self.names else "no header"
                 raise FileError(self.path, f"no column {column!r}; there is {there}")
@@ -169,6 +184,20 @@ class CsvTable:
         if numbers.shape[0] != len(lines):  # a quote that is not closed takes the next row in
             raise ValueError("a quotation mark is not closed")
         return numbers
+
+    def _elements(self, index: int, number: int) -> Array:
+        """The ``number``-th entry, from 1, of the lists in a column."""
+        found = np.empty(len(self._lines))
+        for k, line in enumerate(self._lines):
+            cell = self._cells(line)[index]
+            try:
+                found[k] = float(json.loads(cell)[number - 1])
+            except (ValueError, TypeError, IndexError, KeyError):
+                problem = f"{cell[:40]!r} has no number {number}"
+                raise FileError(
+                    self.path, problem, row=self._rows[k], column=self.names[index], expected="a list of numbers"
+                ) from None
+        return found
 
     def _complaint(self, index: int, error: ValueError) -> FileError:
         for row, line in zip(self._rows, self._lines, strict=True):

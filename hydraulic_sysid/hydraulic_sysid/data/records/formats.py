@@ -6,9 +6,9 @@ from pathlib import Path
 from types import ModuleType
 
 from hydraulic_sysid.data.errors import FileError
-from hydraulic_sysid.data.records import csv_file, hdf5_file, mat_file, parquet_file
+from hydraulic_sysid.data.records import csv_file, hdf5_file, json_file, mat_file, parquet_file
 
-FORMATS: tuple[ModuleType, ...] = (csv_file, mat_file, hdf5_file, parquet_file)
+FORMATS: tuple[ModuleType, ...] = (csv_file, mat_file, hdf5_file, parquet_file, json_file)
 SUFFIXES: tuple[str, ...] = tuple(suffix for f in FORMATS for suffix in f.SUFFIXES)
 
 

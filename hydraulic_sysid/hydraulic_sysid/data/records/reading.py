@@ -31,7 +31,12 @@ def read_records(path: Path | str, columns: ColumnMap | Path | str | None = None
     if not path.exists():
         raise FileError(path, "does not exist")
     if path.is_dir() and not _is_bag(path):
-        entries = [entry for entry in sorted(path.iterdir()) if _holds_record(entry)]
+        # Results are kept as JSON, and notes as text: such are records only where a column map says what they hold.
+        entries = [
+            entry
+            for entry in sorted(path.iterdir())
+            if _holds_record(entry) and (mapping or entry.suffix not in (".json", ".txt"))
+        ]
         if not entries:
             raise FileError(path, "holds no records", expected=_kinds())
         return [record for entry in entries for record in _read(entry, mapping)]
@@ -70,6 +75,8 @@ def _read(path: Path, columns: ColumnMap | None) -> list[Record]:
         return read_bag(path, columns.irregular if columns else "error")
     name = path.name[: -len(suffix_of(path))]
     columns = columns and columns.for_file(path.name)
+    if columns and columns.several_files:
+        name = path.absolute().parent.name
     return records_of_table(format_of(path).table(path, columns), columns, name)
 
 

@@ -109,6 +109,21 @@ class Record:
         return self.units[channel] if channel in self.units else CHANNELS[channel].unit
 
     @property
+    def settings(self) -> dict[str, float]:
+        """What the record states of the machine while it was made: key of a model's parameter → value [SI].
+
+        A load that was put on, a gain that was set, a motor that was switched off: every plant that is set beside this
+        record has these values, whatever the model file says.
+
+        :raises RecordError: a value that is no finite number.
+        """
+        found = self.description.get("settings", {})
+        for key, value in found.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+                raise RecordError(f"{self.name}: the setting {key} is {value!r}, must be a finite number")
+        return {str(key): float(value) for key, value in found.items()}
+
+    @property
     def notes(self) -> list[str]:
         """What the reader assumed or left out."""
         return list(self.description.get("notes", ()))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.data.errors import FileError, TimeError
+from hydraulic_sysid.data.errors import ColumnMapError, FileError, TimeError
 from hydraulic_sysid.data.records import sampling
 from hydraulic_sysid.data.records.channels import HELD
 from hydraulic_sysid.data.records.column_map import Column, ColumnMap
@@ -58,6 +59,7 @@ class Samples:
     row: Callable[[int], int]
     column: str | int
     units: Mapping[str, str] = field(default_factory=dict)
+    held: Collection[str] = HELD
 
 
 def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list[Record]:
@@ -72,32 +74,90 @@ def records_of_table(table: Table, columns: ColumnMap | None, name: str) -> list
     records = []
     for part, mapped in columns.parts.items():
         notes = list(columns.notes)
-        channels = {channel: _finite(table, column) for channel, column in mapped.items()}
+        channels = {channel: _channel(table, column, columns) for channel, column in mapped.items()}
         title = f"{name}.{part}" if part else name
         kept = {key: value for key, value in table.description.items() if key not in _ANEW}
         notes += [n for n in table.description.get("notes", ()) if isinstance(n, str)]
         description: dict[str, Any] = {**kept, **({"columns": columns.name} if columns.name else {})}
         drive_from_command(channels, notes)
+        given = {key: _setting(table, value) for key, value in columns.settings.items()}
         sizes = {values.size for values in channels.values()}
         if columns.dt is not None:
             if len(sizes) != 1 or min(sizes) < 2:
                 raise FileError(table.path, f"columns have {sorted(sizes)} samples", expected="equal lengths ≥ 2")
             description["notes"] = notes
-            records.append(Record.sampled(title, columns.dt, channels, table.path, description, columns.units))
+            for number, (first, last, own) in enumerate(pieces := _constant(given, min(sizes)), 1):
+                stretch = {name: values[first:last] for name, values in channels.items()}
+                whole = description | own
+                label = f"{title}.{number}" if len(pieces) > 1 else title
+                records.append(Record.sampled(label, columns.dt, stretch, table.path, whole, columns.units))
             continue
         assert columns.time is not None
         time = _finite(table, columns.time)
         if sizes != {time.size} or time.size < 2:
             problem = f"channels have {sorted(sizes)} samples, the time {time.size}"
             raise FileError(table.path, problem, expected="equal lengths, at least 2")
-        samples = Samples(table.path, time, channels, table.row, table.label(columns.time.column), columns.units)
-        records += evenly_sampled(samples, columns.irregular, title, notes, description)
+        place = table.label(columns.time.column)
+        for number, (first, last, own) in enumerate(pieces := _constant(given, time.size), 1):
+            stretch = {name: values[first:last] for name, values in channels.items()}
+            row = partial(_row, table, first)
+            held = {n for n, c in mapped.items() if (n in HELD if c.held is None else c.held)} | (HELD - mapped.keys())
+            samples = Samples(table.path, time[first:last], stretch, row, place, columns.units, held)
+            label = f"{title}.{number}" if len(pieces) > 1 else title
+            records += evenly_sampled(samples, columns.irregular, label, notes, description | own, columns.step)
     return records
 
 
+def _channel(table: Table, column: Column, columns: ColumnMap) -> Array:
+    """Samples (N,) of a channel [SI], those of another file at the stamps of the first.
+
+    :raises FileError: the other file is not there, or has no such column.
+    :raises ColumnMapError: without a column of stamps the two do not belong together.
+    """
+    if column.file is None:
+        return _finite(table, column)
+    from hydraulic_sysid.data.records.formats import format_of  # which needs the errors of this package itself
+
+    if columns.time is None:
+        raise ColumnMapError(f"{columns.name}: {column.file}: a column of another file needs a time column in both")
+    path = table.path.parent / column.file
+    if not path.is_file():
+        raise FileError(path, "does not exist")
+    other: Table = format_of(path).table(path, columns)
+    stamps, wanted = (_finite(one, columns.time) for one in (other, table))
+    sampling.increasing(stamps)
+    return np.interp(wanted, stamps, _finite(other, column))
+
+
+def _row(table: Table, first: int, index: int) -> int:
+    return table.row(first + index)
+
+
+def _setting(table: Table, value: float | Column) -> float | Array:
+    return _finite(table, value) if isinstance(value, Column) else value
+
+
+def _constant(given: Mapping[str, float | Array], count: int) -> list[tuple[int, int, dict[str, Any]]]:
+    """Stretches of samples over which all settings stay, and what a description says of them there."""
+    if not given:
+        return [(0, count, {})]
+    varying = [values for values in given.values() if isinstance(values, np.ndarray)]
+    changes = np.zeros(max(count - 1, 0), dtype=bool)
+    for values in varying:
+        changes |= np.diff(values) != 0.0
+    bounds = [0, *(np.flatnonzero(changes) + 1).tolist(), count]
+    found = []
+    for first, last in zip(bounds, bounds[1:], strict=False):
+        if last - first > 1:
+            own = {key: float(v[first]) if isinstance(v, np.ndarray) else v for key, v in given.items()}
+            found.append((first, last, {"settings": own}))
+    return found
+
+
 def evenly_sampled(
-    samples: Samples, irregular: str, name: str, notes: list[str], description: Mapping[str, Any]
-) -> list[Record]:
+    samples: Samples, irregular: str, name: str, notes: list[str], description: Mapping[str, Any],
+    step: float | None = None,
+) -> list[Record]:  # fmt: skip
     """The samples as one record, or as several where ``irregular`` is "split" and samples are missing.
 
     :raises TimeError: the stamps do not increase, or are not even and ``irregular`` is "error".
@@ -106,7 +166,7 @@ def evenly_sampled(
     try:
         sampling.increasing(time)
         if irregular == "resample":
-            return [_resampled(samples, name, notes, description)]
+            return [_resampled(samples, name, notes, description, step)]
         spans = [(0, time.size)]
         if irregular == "split":
             bounds = [0, *sampling.gaps(time), time.size]
@@ -152,10 +212,12 @@ def _records(
         yield Record.sampled(title, even.dt, channels, samples.path, described, samples.units)
 
 
-def _resampled(samples: Samples, name: str, notes: Sequence[str], description: Mapping[str, Any]) -> Record:
-    """On the even grid with the median period; drives hold their value, the rest is interpolated linearly."""
+def _resampled(
+    samples: Samples, name: str, notes: Sequence[str], description: Mapping[str, Any], step: float | None = None
+) -> Record:
+    """On the even grid with this period, or the median one; drives hold their value, the rest is straight lines."""
     time = samples.time
-    dt = float(f"{np.median(np.diff(time)):.9g}")
+    dt = step or float(f"{np.median(np.diff(time)):.9g}")
     span = float(time[-1] - time[0])
     if span > _MOST_SAMPLES * dt:
         problem = f"resampling {span:.6g} s every {dt:.6g} s makes more than {_MOST_SAMPLES} samples"
@@ -164,7 +226,7 @@ def _resampled(samples: Samples, name: str, notes: Sequence[str], description: M
     grid = time[0] + dt * np.arange(count)
     before = np.clip(np.searchsorted(time, grid + 1e-6 * dt, side="right") - 1, 0, time.size - 1)
     channels = {
-        channel: values[before] if channel in HELD else np.interp(grid, time, values)
+        channel: values[before] if channel in samples.held else np.interp(grid, time, values)
         for channel, values in samples.channels.items()
     }
     longest = float(np.diff(time).max())

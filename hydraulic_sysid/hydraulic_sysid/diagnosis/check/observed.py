@@ -196,6 +196,8 @@ class Observed:
     def force(self) -> Array | None:
         """Force (N,) that the records show: of both pressures, or of a mechanical plant's drive; None without it."""
         if self.plant.model.kind == "mechanical":
+            if self.plant.closes_a_loop:  # the drive is a position, and the force nowhere in the record
+                return None
             force: Array = self.plant.value("drive_force") * self.plant.value("drive_limit") * self.opening
             return force
         if not {"pressure_a", "pressure_b"} <= self.signals.keys():

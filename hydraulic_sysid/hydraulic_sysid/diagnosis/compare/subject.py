@@ -60,7 +60,8 @@ class ModelSubject:
 
     def runs(self, data: Measured) -> PlantRuns:
         """The plant, and its states in the free run."""
-        return PlantRuns(self.plant, data)
+        settings = data.record.settings
+        return PlantRuns(self.plant.with_parameters(settings) if settings else self.plant, data)
 
     def document(self) -> dict[str, Any]:
         """See `model_document`."""

@@ -83,7 +83,7 @@ class Balances:
         """The same for other parameter values [SI]."""
         other = copy.copy(self)
         other.plant = self.plant.with_parameters(values)
-        known = set(self.flow_plant.model.keys())
+        known = set(self.flow_plant.layout.parameters)
         other.flow_plant = self.flow_plant.with_parameters({k: v for k, v in values.items() if k in known})
         return other
 
@@ -178,7 +178,7 @@ def _force(plant: Plant, run: dict[str, Array], seen: Array, dt: float, n: int) 
     x = seen[:, 0]
     wide = np.concatenate(([2.0 * x[0] - x[1]], x, [2.0 * x[-1] - x[-2]]))
     required = ((wide[3:] - wide[2:-1] - wide[1:-2] + wide[:-3]) / (2.0 * dt * dt))[:n]
-    gap = plant.value("moving_mass") * (required - _rate(run["velocity"], dt))
+    gap = plant.mass * (required - _rate(run["velocity"], dt))
     if plant.model.kind == "hydraulic":
         # The model's own pressures moved on from the measured ones within the few samples: their part is exchanged.
         for index, area in ((2, plant.value("piston_area_a")), (3, -plant.value("piston_area_b"))):

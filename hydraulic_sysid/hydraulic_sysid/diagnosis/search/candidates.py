@@ -15,6 +15,7 @@ from hydraulic_sim import slots
 from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.errors import ModelError
 from hydraulic_sim.model import Model
+from hydraulic_sim.typical import sized
 
 SHAPES = (1.0, 0.3, 3.0, 8.0)  # of the default
 SIZES = (1.0, 0.25)  # of the default, measured from the null value
@@ -39,16 +40,16 @@ class Probe:
 
 
 def candidates(model: Model) -> list[Effect]:
-    """Library effects that are off and could act in this model."""
+    """Library effects that are off and could act in this model, their defaults in the size of its plant."""
     found = []
     for effect in model.library.values():
-        if effect.name in model.effects or effect.always_on:
+        if effect.name in model.effects or effect.always_on or not effect.searched:
             continue
         try:
             model.with_effect(effect.name).check_complete()
         except ModelError:  # another law has the slot, or the plant has no such stage
             continue
-        found.append(effect)
+        found.append(sized(model, effect))
     return found
 
 

@@ -72,7 +72,7 @@ def document(
         },
         "residual": {
             "unit": "residual over noise",
-            "before": _residual(result.before),
+            "before": _residual(result.before_over_noise),
             "after": _residual(final.misfit),
             "after_each_effect": [{"name": name, **_residual(after)} for name, after in result.misfits.items()],
         },

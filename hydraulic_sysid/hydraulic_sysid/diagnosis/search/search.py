@@ -13,7 +13,6 @@ from functools import partial
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
@@ -22,7 +21,7 @@ from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.parameters import Parameters, bounded
 from hydraulic_sysid.estimation.refinement import outlying, refined, usable
-from hydraulic_sysid.estimation.segments import Segments, shorter
+from hydraulic_sysid.estimation.segments import shorter
 
 from .agreement import agreed
 from .candidate_table import candidate_table
@@ -48,7 +47,7 @@ from .progress import OutOfTimeError, Progress, Watch
 from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import immaterial, negligible, remainders
 from .score_test import CandidateScore, score
-from .search_state import CandidateRefit, FaultFit, SearchResult, SearchState
+from .search_state import CandidateRefit, FaultFit, SearchResult, SearchState, loud
 from .set_aside import accidents
 from .spectral_lines import record_features
 from .uncertainty import parameter_errors
@@ -123,7 +122,7 @@ class Search:
         """The model and what it became with each effect added, as far as the search has come …"""
         self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
         """… and the state that candidates were refitted on last, with these refits."""
-        self.as_recorded: Misfit | None = None
+        self.as_recorded: SearchState | None = None
         self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
         self.priors = priors(model)
         self._first = replace(settings, least_gain=FIRST_GAIN)
@@ -251,7 +250,7 @@ class Search:
                 break
             if leaves_most(base.misfit, found.misfit):
                 break
-            self.as_recorded = self.as_recorded or base.misfit
+            self.as_recorded = self.as_recorded or base
             self.faults = together(self.faults, found.fault)
             self.split, self.path = found.split, [found.state]
             base = self.loosened(self.judged(found.state))
@@ -380,7 +379,7 @@ class Search:
                 return replace(
                     found, split=alone.split, base=alone.state, final=alone.state, misfits={}, competing={}, moved=(),
                     faults=tuple(together(found.faults, alone.fault)),
-                    as_recorded=found.as_recorded or found.base.misfit,
+                    as_recorded=found.as_recorded or found.base,
                 )  # fmt: skip
             # Beside a fault, other numbers may be wrong than beside the effect.
             tied = (
@@ -785,12 +784,6 @@ def quieter(before: Split, after: Split) -> bool:
         for new, old in zip(after.segments, before.segments, strict=True)
         for n, o in zip(loud(new), loud(old), strict=True)
     )
-
-
-def loud(segments: Segments) -> Array:
-    """(C,) root mean square over the segments of what is new in each sample's noise [SI]."""
-    innovation = np.array([n.innovation for n in segments.noise])
-    return np.asarray(innovation * np.sqrt(np.mean(segments.loudness**2, axis=0)))
 
 
 def retimed(before: Split, after: Split) -> bool:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+
+import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.model import Model
 from hydraulic_sysid.estimation.fit import FitSettings
+from hydraulic_sysid.estimation.segments import Segments
 
 from .data_sheet import Deviation
 from .frozen_jacobian import Refit
@@ -65,7 +68,7 @@ class SearchResult:
     """Where a search ended.
 
     ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
-    ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the misfit
+    ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the state
     before any fault of the recording was assumed; ``faults_instead``: that explain what the one effect added does.
     """
 
@@ -79,14 +82,22 @@ class SearchResult:
     moved: Sequence[Deviation] = ()
     faults: Sequence[RecordingFault] = ()
     faults_instead: Sequence[RecordingFault] = ()
-    as_recorded: Misfit | None = None
+    as_recorded: SearchState | None = None
     stopped: bool = False
     """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""
 
     @property
     def before(self) -> Misfit:
         """What the model left before anything was explained."""
-        return self.as_recorded or self.base.misfit
+        return (self.as_recorded or self.base).misfit
+
+    @property
+    def before_over_noise(self) -> Misfit:
+        """The same over the noise that the end is judged by: with a fault of the recording noise is estimated anew."""
+        if self.as_recorded is None:
+            return self.before
+        ratio = noise_ratio(self.as_recorded.linearisation.split, self.split)
+        return replace(self.before, fit=ratio * self.before.fit, validation=ratio * self.before.validation)
 
     @property
     def unexplained_share(self) -> float:
@@ -112,3 +123,15 @@ class SearchResult:
     def spikes(self) -> list[Spikes]:
         """Samples that do not count."""
         return spikes(self.split)
+
+
+def noise_ratio(one: Split, other: Split) -> float:
+    """Noise power of one split over that of another of the same records, mean over records and channels (1: none)."""
+    ratios = [np.mean((loud(a) / loud(b)) ** 2) for a, b in zip(one.segments, other.segments, strict=True)]
+    return float(np.mean(ratios)) if ratios else 1.0
+
+
+def loud(segments: Segments) -> Array:
+    """(C,) root mean square over the segments of what is new in each sample's noise [SI]."""
+    innovation = np.array([n.innovation for n in segments.noise])
+    return np.asarray(innovation * np.sqrt(np.mean(segments.loudness**2, axis=0)))

@@ -164,7 +164,7 @@ def place(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparametric
 
 def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
     """What a user reads first."""
-    base, final = result.before.rms_validation, result.final.misfit.rms_validation
+    base, final = result.before_over_noise.rms_validation, result.final.misfit.rms_validation
     left = " ".join([remainder_sentence(result.remainders), *noise_sentences(result)])
     aside = set_aside_sentences(result.split.set_aside)
     fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."

@@ -1,0 +1,95 @@
+"""MTS servo-hydraulic machine in position control against an MR damper: lag and dead time of the machine's own loop.
+
+The plant is a lag of order 1 between commanded and measured position, to which `diagnose` may add. A sweep of 1.4 mm
+from 0.2 to 20 Hz without current is fitted at 11 to 14 Hz; test data are the sweep with 1 A there, which
+nothing else reads. Beside the verdict stands the frequency response, read from the records by hand.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array
+from hydraulic_sim.model import Model
+from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.data.records import Record, read_records
+from hydraulic_sysid.diagnosis.calibrate import calibrate
+from hydraulic_sysid.estimation.fit import FitSettings
+from measured.study import DATA, MODELS, Check, Row, Source, Work, free_run, rms, said
+
+SOURCE = Source(
+    "https://github.com/DanielMaurelE/vRTHS_AMBC_MRdamper", "08753ffd7abd5b19053f7e79149c3a68f49bf73c",
+    "0A.txt", "MIT", "vRTHS benchmark with an MR damper, UTFSM Chile (2022)",
+)  # fmt: skip
+EXCERPT = DATA / "mts"
+COLUMNS = "mts_mr_damper"
+FIT_WINDOW, TEST_WINDOW, QUICK_WINDOW = (34.0, 44.0), (30.0, 40.0), (34.0, 38.0)
+SEGMENT = 0.5
+
+
+def response(record: Record) -> tuple[float, complex]:
+    """Strongest frequency [Hz] of the command and displacement over command there."""
+    window = np.hanning(len(record))
+    command, position = (np.fft.rfft(window * (record[c] - record[c].mean())) for c in ("drive", "position"))
+    k = int(np.argmax(np.abs(command)))
+    return k / record.duration, complex(position[k] / command[k])
+
+
+def by_hand(record: Record) -> tuple[float, float]:
+    """Time constant [s] of a lag of order 1 from the gain, and the dead time [s] that the rest of the phase is.
+
+    Means over pieces of 2 s, since the frequency moves.
+    """
+    found = []
+    for begin in np.arange(0.0, record.duration - 2.0, 2.0):
+        frequency, gain = response(record.window(begin, begin + 2.0))
+        w = 2.0 * np.pi * frequency
+        lag = np.sqrt(1.0 / abs(gain) ** 2 - 1.0) / w
+        found.append((lag, (-np.angle(gain) - np.arctan(w * lag)) / w))
+    lag, dead = np.mean(found, axis=0)
+    return float(lag), float(dead)
+
+
+def study(data: Path, work: Work) -> list[Row]:
+    """One row; quickly, a shorter window is searched."""
+    folder = next(data.rglob("0A.txt")).parent
+    path = MODELS / "mts.yaml"
+    window = QUICK_WINDOW if work.quick else FIT_WINDOW
+    (fit,), (test,) = (read_records(folder / f"{name}.txt", COLUMNS) for name in ("0A", "1A"))
+    fit, test = fit.window(*window), test.window(*TEST_WINDOW)
+    words = ["--model", path, "--record", folder / "0A.txt", "--columns", COLUMNS, "--window", *window]
+    if not work.quick:
+        work.verb("compare", *words, into="compared")
+    found = work.verb("diagnose", *words, "--segment", SEGMENT, "--within", 280, "--apply", into="diagnosed")
+    verdict, evidence = said(found)
+    named = list(found["verdict"]["effects"])
+    instead = {c["name"] for name in named for c in found["competing_models"].get(name, []) if not c["distinguishable"]}
+    bare = calibrate(load_model(path), [fit], settings=FitSettings(length=SEGMENT)).model
+    delayed = calibrate(bare.with_effect("command_delay"), [fit], settings=FitSettings(length=SEGMENT)).model
+    runs: dict[str, Array] = {"before": free_run(bare, test), "after": free_run(delayed, test)}
+    before, after = (1e3 * rms(y - test["position"]) for y in runs.values())
+    lag, dead = by_hand(fit)
+    delay, fitted_lag = delayed.value("command_delay.delay"), _lag(delayed)
+    shown = test.window(0.0, 0.5)
+    panel = {"measured": shown["position"], **{k: v[: len(shown)] for k, v in runs.items()}}
+    work.picture("mts", [("1 A, 0.5 s of the test record", shown.time, {k: 1e3 * v for k, v in panel.items()})], "mm")
+    return [Row(
+        "MTS machine", verdict + (f"; not distinguishable: {', '.join(sorted(instead))}" if instead else ""), evidence,
+        "RMSE of displacement in free run, 1 A [mm], before and with command_delay", before, after,
+        "17 ms, cross-correlation of command and displacement over all of the sweep: lag and dead time together",
+        f"by hand, from the frequency response: lag {1e3 * lag:.1f} ms and dead time {1e3 * dead:.1f} ms; fitted lag "
+        f"{1e3 * fitted_lag:.1f} ms, dead time {1e3 * delay:.2f} ms; what the valve is, is not known",
+        [Check(f"command_delay is named or not distinguishable from what is: {named}, {sorted(instead)}",
+               "command_delay" in {*named, *instead}),
+         Check(f"dead time {1e3 * delay:.2f} ms within 1.5 ms of {1e3 * dead:.2f} ms by hand",
+               abs(delay - dead) < 1.5e-3),
+         Check(f"{before:.4f} → {after:.4f} mm: falls by a quarter or more", after < 0.75 * before)],
+    )]  # fmt: skip
+
+
+def _lag(model: Model) -> float:
+    """Time constant [s] of the model's loop: damping over stiffness."""
+    stiffness = model.value("position_loop.gain") * model.value("drive_force") * model.value("drive_limit")
+    return model.value("viscous_friction.coefficient") / stiffness

@@ -1,0 +1,91 @@
+"""SO-101 arm: six servo joints; gravity, dead time and backlash beside `mujoco.sysid` on the same motions.
+
+Fitted to multisine, friction_gravity and backlash_detection, tested in free run on chirp_sweep, step_response and
+random_waypoints, the first 40 s of each. The structure is what `diagnose` names, or what comes nearest where it names
+nothing; no test motion has a say. The figures of `mujoco.sysid` are those of `_mujoco_joint.py` over the same samples
+(`models/so101_mujoco.json`): it needs an interpreter of its own and does not run here.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from hydraulic_sim.model import Model
+from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.data.records import Record, read_records
+from hydraulic_sysid.diagnosis.calibrate import calibrate
+from hydraulic_sysid.estimation.fit import FitSettings
+from measured.study import DATA, MODELS, Check, Row, Source, Work, free_run, rms, said
+
+SOURCE = Source(
+    "https://github.com/isaac-sim2real/sage", "4ffd2627df9d23e279b35712a67e629ce0c0dfa7", "multisine/control.csv",
+    "Apache-2.0", "SAGE, output/real/so101: 50 motions of an SO-101 arm, 50 Hz",
+)  # fmt: skip
+EXCERPT = DATA / "so101"
+FIT = ("multisine", "friction_gravity", "backlash_detection")
+TEST = ("chirp_sweep", "step_response", "random_waypoints")
+SECONDS, QUICK_SECONDS, SEGMENT = 40.0, 15.0, 1.5
+QUICK = "elbow"
+JOINTS = {"pitch": "gravity_pendulum", "elbow": "gravity_pendulum", "rotation": None}
+"""Joint → what is known of it: the weight of an arm; the axis of the rotation is vertical."""
+
+
+def motion(folder: Path, name: str, joint: str) -> Record:
+    """The first 40 s of one joint in one motion."""
+    (record,) = read_records(folder / name / "control.csv", f"so101_{joint}")
+    return record.window(0.0, SECONDS) if record.duration > SECONDS + 0.1 else record
+
+
+def fitted(model: Model, records: list[Record]) -> Model:
+    return calibrate(model, records, settings=FitSettings(length=SEGMENT)).model
+
+
+def study(data: Path, work: Work) -> list[Row]:
+    """Each joint; quickly the elbow alone, fitted to 15 s of two motions, what is known of it in place of a search."""
+    folder = next(data.rglob(SOURCE.files)).parent.parent
+    rows = []
+    for joint, known in JOINTS.items():
+        if not work.wanted(joint, QUICK):
+            continue
+        fit = [motion(folder, name, joint) for name in FIT]
+        if work.quick:
+            fit = [record.window(0.0, QUICK_SECONDS) for record in fit[:2]]
+        test = [motion(folder, name, joint) for name in TEST]
+        bare = load_model(MODELS / "so101.yaml")
+        verdict, evidence, named = "not searched", "the structure is given", known
+        if not work.quick:
+            words = ["--model", MODELS / "so101.yaml", "--record", *(folder / n / "control.csv" for n in FIT)]
+            words += ["--columns", f"so101_{joint}", "--window", 0, SECONDS, "--segment", SEGMENT]
+            work.verb("compare", *words[:-2], into=f"{joint}_compared")
+            found = work.verb("diagnose", *words, "--within", 200, into=f"{joint}_diagnosed")
+            verdict, evidence = said(found)
+            named = found["verdict"]["effects"][0] if found["verdict"]["effects"] else None
+        before = fitted(bare, fit)
+        after = fitted(bare.with_effect(named), fit) if named else before
+        runs = {which: [free_run(m, r) for r in test] for which, m in (("before", before), ("after", after))}
+        errors = {k: [1e3 * rms(y - r["position"]) for y, r in zip(v, test, strict=True)] for k, v in runs.items()}
+        mean = {which: float(np.mean(values)) for which, values in errors.items()}
+        own = json.loads((MODELS / "so101_mujoco.json").read_text("utf-8"))[joint]
+        theirs = 1e3 * float(np.mean([own["rmse"][f"test.{name}"] for name in TEST]))
+        checks = [Check(f"{joint}: {known or 'no load'} is named or nearest", named == known)] if not work.quick else []
+        checks.append(Check(f"{joint}: {mean['after']:.1f} ≤ 0.9 × {theirs:.1f} mrad", mean["after"] <= 0.9 * theirs))
+        if known:
+            checks.append(Check(f"{joint}: {mean['before']:.1f} falls to less than half, {mean['after']:.1f} mrad",
+                                mean["after"] < 0.5 * mean["before"]))  # fmt: skip
+        free = len(after.free_keys())
+        rows.append(Row(
+            f"SO-101 {joint}", verdict, evidence, "RMSE of position in free run, mean of 3 test motions [mrad]",
+            mean["before"], mean["after"], f"mujoco[sysid] {own['version']}: {theirs:.1f} ({own['free']} parameters)",
+            f"{'an arm that gravity pulls' if known else 'a vertical axis, no gravity'}; {free} free parameters; "
+            f"each test motion: {', '.join(f'{n} {e:.1f}' for n, e in zip(TEST, errors['after'], strict=True))} mrad",
+            checks,
+        ))  # fmt: skip
+        panels = [
+            (f"{joint}, {name}", r.time, {"measured": r["position"], **{k: v[i] for k, v in runs.items()}})
+            for i, (name, r) in enumerate(zip(TEST, test, strict=True))
+        ]
+        work.picture(f"so101_{joint}", panels, "rad")
+    return rows
