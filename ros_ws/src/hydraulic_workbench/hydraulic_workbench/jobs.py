@@ -122,7 +122,7 @@ class Jobs:
         return job
 
     async def cancel(self, job: Job) -> None:
-        """End it: at once where it waits. A diagnosis may take its time to end with the best so far, unless asked again.
+        """End it: at once where it waits. A diagnosis may take its time to end with the best so far, until asked twice.
 
         :raises WorkbenchError: it is over.
         """

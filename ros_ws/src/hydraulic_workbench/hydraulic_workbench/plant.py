@@ -26,8 +26,9 @@ NOTHING = Chosen("none", "", lockstep=False)
 
 
 def plain_words(tail: str) -> str:
-    """The last lines of a node's log without the marks of the log: margin, level, time and node."""
-    return re.sub(r"^ *\| (?:\[[A-Z]+\] \[[\d.]+\] \[[\w./]+\]: )?", "", tail, flags=re.MULTILINE)
+    """The last lines of a node's log, each once, without the marks of the log: margin, level, time and node."""
+    mark = re.compile(r"^ *\| (?:\[[A-Z]+\] \[[\d.]+\] \[[\w./]+\]: )?")
+    return "\n".join(dict.fromkeys(mark.sub("", line) for line in tail.splitlines()))
 
 
 class Plant:
