@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,6 +27,23 @@ def start_simulator(page: Any, button: str = "#start-simulator") -> None:
     page.click("#enable")
     page.click("dialog .primary")
     page.wait_for_selector("#disable")
+
+
+def drop(page: Any, selector: str, *files: Path) -> None:
+    """Drop files or folders of this machine onto an element, as from a file manager."""
+    box = page.locator(selector).bounding_box()
+    place = {"x": box["x"] + box["width"] / 3, "y": box["y"] + box["height"] / 2}
+    data = {"items": [], "files": [str(file) for file in files], "dragOperationsMask": 1}
+    devtools = page.context.new_cdp_session(page)
+    for kind in ("dragEnter", "dragOver", "drop"):
+        devtools.send("Input.dispatchDragEvent", {"type": kind, **place, "data": data})
+    devtools.detach()
+
+
+def hidden_part(page: Any, selector: str) -> float:
+    """By how many pixels the widest of the elements that scroll sideways is wider than what is seen of it."""
+    wider = "all => Math.max(...all.map((one) => one.scrollWidth - one.clientWidth))"
+    return float(page.eval_on_selector_all(selector, wider))
 
 
 def figure(text: str) -> float:

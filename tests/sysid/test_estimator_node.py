@@ -85,6 +85,7 @@ def bench(launch: Any, client: Any, wait_until: Any, compiled_physics: None) -> 
 def test_the_topics_carry_what_the_pure_parts_make_of_the_states(bench: Bench, tmp_path: Path) -> None:
     file = tmp_path / "model.json"
     process = bench.start("-p", "sampling_time:=0.02", "-p", "na:=2", "-p", "nb:=2", "-p", f"save_to:={file}")
+    rows: list[Any] = bench.client.collect("diagnostics")
     bench.coefficients(100)
     heard = {name: list(messages) for name, messages in bench.heard.items()}
 
@@ -101,6 +102,14 @@ def test_the_topics_carry_what_the_pure_parts_make_of_the_states(bench: Bench, t
         assert residual.effort[1] == 0.0  # the drive is that which was applied
     # The plant is the model: what is left is the sensor's noise and a little from each start.
     assert np.sqrt(np.mean([m.position[0] ** 2 for m in heard["residual"]])) < 5e-4
+
+    def rms() -> float:
+        said = [
+            pair.value for m in rows for r in m.status for pair in r.values if pair.key == "position_residual_rms_m"
+        ]
+        return float(said[-1]) if said else math.nan
+
+    bench.wait_until(lambda: 0.0 < rms() < 5e-4, "the same in the diagnostics")
 
     # The linear model: coefficients, poles and fit of one instant belong together.
     poles, fit = heard["model_poles"][-1], heard["model_fit"][-1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -12,7 +14,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.resampling import held_average, sampled
 from hydraulic_sysid.estimation import metrics
 from hydraulic_sysid.linear.models import ArxOrder, IdentificationError, RecursiveArx, fit_arx
-from hydraulic_sysid.linear.online import LiveModel, RunningFit, SlowSampler
+from hydraulic_sysid.linear.online import LiveModel, RecentRms, RunningFit, SlowSampler
 
 ORDER = ArxOrder(2, 2, 1)
 FIRST, SECOND = ([1.0, -1.5, 0.7], [0.0, 1.0, 0.5]), ([1.0, -1.2, 0.5], [0.0, 0.6, 0.9])
@@ -196,3 +198,15 @@ def test_a_wrong_model_drifts_until_it_restarts_from_the_measurement() -> None:
     samples = stream(truth, u, 1e-3)
     assert gap.take(samples[0]) is None and gap.take(samples[1]) is not None
     assert gap.take(samples[100]) is None and gap.restarts == 2
+
+
+def test_the_rms_of_the_last_reports_forgets_what_is_older() -> None:
+    recent = RecentRms(2)
+    assert math.isnan(recent.next())
+    for value in (3.0, -3.0, math.nan):
+        recent.take(value)
+    assert recent.next() == pytest.approx(3.0)
+    recent.take(1.0)
+    assert recent.next() == pytest.approx(math.sqrt(19.0 / 3.0)), "two reports, three samples"
+    recent.take(1.0)
+    assert recent.next() == pytest.approx(1.0)

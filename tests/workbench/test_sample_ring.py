@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -96,3 +97,21 @@ def test_a_frame_has_the_layout_that_the_page_reads(ring: SampleRing) -> None:
     assert np.frombuffer(frame, "<f8", 2, 16).tolist() == pytest.approx([0.0, 0.002])
     assert np.frombuffer(frame, "<f4", 2, 16 + 16 + 4 * 2 * 1).tolist() == [3.0, 4.0]
     assert len(frame) == 16 + 2 * 8 + 3 * 2 * 4
+
+
+def test_the_kept_half_moves_without_a_copy_of_all() -> None:
+    """The heap of a process keeps the room of a large copy: its memory would grow after some minutes."""
+    capacity, columns = 20_000, 17
+    ring = SampleRing(capacity, columns, 200 * MS)
+    times = np.arange(1, 2 * capacity + 1, dtype=np.int64) * MS
+    for part in (times[:capacity], times[capacity:]):
+        ring.append(range(columns), part, np.tile(part.astype(np.float32), (columns, 1)))
+    tracemalloc.start()
+    try:
+        after = times[-1:] + MS
+        ring.append(range(columns), after, np.ones((columns, 1), np.float32))
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert ring.newest_ns == after[0]
+    assert most < 0.5 * 4 * columns * capacity

@@ -26,7 +26,7 @@ from hydraulic_node_utils.parameter_spec import ParameterSpec
 from hydraulic_node_utils.scheduling import request_realtime_for_all
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.linear.models import ArxOrder
-from hydraulic_sysid.linear.online import LiveModel, RunningArx
+from hydraulic_sysid.linear.online import LiveModel, RecentRms, RunningArx
 from hydraulic_sysid.nodes import _estimator_messages as messages
 
 PARAMETERS = (
@@ -43,6 +43,7 @@ PARAMETERS = (
     ParameterSpec("realtime_priority", 3, "FIFO priority where permitted, 0: none", "", 0, 98),
 )
 HEALTH_S = 0.5
+RESIDUAL_S = 2.0  # over which `/diagnostics` gives the residual of the position
 SILENCE_S = 1.0
 GAP_NS = 20_000_000
 
@@ -77,6 +78,7 @@ class Estimator(ServedNode):
         self._heard = self._reset_at = time.monotonic()
         self._reset_period = values["reset_period"]
         self._count = self._bad = 0
+        self._residual = RecentRms(round(RESIDUAL_S / HEALTH_S))
         if values["realtime_priority"]:  # what cannot keep up makes the plant send everything twice
             request_realtime_for_all(values["realtime_priority"])
 
@@ -105,6 +107,8 @@ class Estimator(ServedNode):
         pair = self._live.take(sample) if self._live is not None else None
         for (publisher, encode), values in zip(self._streams, pair or (), strict=False):
             publisher.publish(encode(values))
+        if pair is not None:
+            self._residual.take(pair[1].position)
         output = getattr(sample, self._arx.output)
         if not math.isfinite(output):
             return
@@ -121,6 +125,7 @@ class Estimator(ServedNode):
         figures |= {"one_step_fit_percent": f"{self._arx.fit.best_fit:.2f}", "certainty": f"{arx.certainty:.3g}"}
         if self._live is not None:
             figures |= {"model": self._live.plant.model.name, "restarts": self._live.restarts}
+            figures["position_residual_rms_m"] = f"{self._residual.next():.4g}"
         now_ns = self.get_clock().now().nanoseconds
         self._health.publish(messages.health(self.get_fully_qualified_name(), text, silent, figures, now_ns))
 

@@ -41,9 +41,9 @@ def find_browser() -> str | None:
     return None
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    """The browser, headless; a skip without one, unless one is required."""
+    """The browser, headless; a skip without one, unless one is required. (While it is there, no other loop can run.)"""
     path = find_browser()
     if path is None:
         if os.environ.get(REQUIRED):

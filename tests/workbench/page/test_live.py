@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from page_steps import start_simulator, until
+from page_steps import hidden_part, start_simulator, until
 
 REDRAWS = 25.0  # per second, wanted of the machine that benchmarks/workbench.py runs on
 SLOW_MACHINE = 0.5  # of that
@@ -81,6 +81,7 @@ def test_zoom_shows_every_sample_and_cursors_read(page: Any, picture: Callable[.
     page.mouse.click(plot["x"] + 0.6 * plot["width"], middle)
     assert page.locator("h2:has-text('Cursors')").count() == 1
     assert page.evaluate("Object.values(document.querySelector('live-strips').marks).every(Number.isFinite)")
+    assert hidden_part(page, ".scroll:has(table.cursors)") <= 0, "a reading is cut off"
     picture(page, "live-cursors")
     page.keyboard.press("Escape")
     page.wait_for_selector('#pause[aria-pressed="false"]')

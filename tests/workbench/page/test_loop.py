@@ -6,10 +6,17 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from page_steps import figure, until
+from page_steps import figure, hidden_part, until
 
 MOST_CLICKS = 12
 AT_THE_NOISE = 1.1
+SHRUNK = 0.5  # the residual beside the plant with the effect, over that without
+REFITTED = "Object.values(workbench.state.candidates).flat().some((one) => Number.isFinite(one.residual_after))"
+STEADY_MS = 3000  # the residual is that of the last 2 s
+RESIDUAL = """model => {
+    const now = workbench.state.bench.live_model;
+    return now.phase === "running" && now.model.includes(model) && Number.isFinite(now.residual) && now.residual;
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +47,9 @@ def test_a_hidden_effect_is_named_and_added_within_twelve_clicks(page: Any, pict
     page.click('#next:has-text("Diagnose this record")')
     page.wait_for_selector("table.candidates tbody tr")  # fills while the search runs
     assert page.locator("#cancel-job").count() == 1
+    until(page, REFITTED)
     picture(page, "loop-5-search")
+    assert hidden_part(page, ".scroll:has(table.candidates)") <= 0, "the Add buttons are cut off"
     page.wait_for_selector("[aria-label=Verdict]")
     verdict = page.inner_text("[aria-label=Verdict] .verdict")
     assert verdict.startswith("Missing: valve_deadband"), verdict
@@ -61,12 +70,29 @@ def test_a_hidden_effect_is_named_and_added_within_twelve_clicks(page: Any, pict
 
 
 def test_the_new_model_runs_beside_the_plant(page: Any, picture: Callable[..., None]) -> None:
+    page.evaluate("location.hash = '#/live'")
+    page.click("#start-controller")
+    page.click("summary:has-text('Its shape')")
+    cycles = page.locator(".slider:has-text('cycles') input")
+    cycles.evaluate("e => { e.value = e.max; }")  # so that it moves all the time
+    cycles.dispatch_event("input")
+    page.click("#start-reference")
+    page.select_option("#live-model", label="moog_mcr_m_1002_bench")
+    until(page, RESIDUAL, "moog")
+    page.wait_for_timeout(STEADY_MS)
+    before = page.evaluate(RESIDUAL, "moog")
+    page.evaluate("location.hash = '#/diagnose'")
     page.click("#beside")
     page.evaluate("location.hash = '#/live'")
-    page.wait_for_selector(".residual b")
-    until(page, "workbench.live.ring.has('residual_position')")
-    page.wait_for_timeout(1500)
+    until(page, RESIDUAL, "add")
+    page.wait_for_timeout(STEADY_MS)
+    after = page.evaluate(RESIDUAL, "add")
+    assert page.evaluate("workbench.state.bench.reference.phase") == "running", "the piston moves while it is measured"
     picture(page, "live-model-beside")
+    print(f"residual of the position {1e3 * before:.3f} mm, with the effect {1e3 * after:.3f} mm")
+    assert after < SHRUNK * before
+    assert figure(page.inner_text(".residual b")) < SHRUNK * 1e3 * before, "the page shows it in mm"
+    page.click("#stop-controller")
 
 
 def test_an_added_effect_is_taken_back(page: Any) -> None:
@@ -86,6 +112,8 @@ def test_an_error_map_shows_the_samples_behind_a_place(page: Any, picture: Calla
     bins = page.locator(".map .bins button")
     bins.nth(bins.count() // 2).click()
     page.wait_for_selector(".behind series-chart canvas")
+    said = page.inner_text(".behind p >> nth=0")
+    assert f", {figure(said):.0f} samples" in page.get_attribute('.map .bins button[aria-pressed="true"]', "title")
     picture(page, "compare")
 
 
@@ -104,3 +132,32 @@ def test_figures_of_the_report_open_on_demand(page: Any, picture: Callable[..., 
     assert page.evaluate(loaded)
     page.locator("plotly-figure").scroll_into_view_if_needed()
     picture(page, "report-figure")
+
+
+def test_what_is_left_before_and_after_is_the_figure_of_the_report(page: Any, picture: Callable[..., None]) -> None:
+    page.click("[aria-label=Results] button:has-text('diagnose')")
+    page.click("[aria-label='Before and after'] button:has-text('Errors')")
+    page.wait_for_selector("[aria-label='Before and after'] plotly-figure .main-svg")
+    picture(page, "before-after-errors")
+
+
+def test_the_model_of_the_verdict_is_taken(page: Any) -> None:
+    page.click("#apply")
+    page.wait_for_selector("ol.timeline li.current:has-text('applied')")
+    assert figure(page.inner_text("ol.timeline li.current .chip")) <= AT_THE_NOISE
+    assert "valve_deadband" in page.evaluate("workbench.state.bench.current_model.effects")
+
+
+def test_the_free_parameters_are_fitted_after_a_check(page: Any, picture: Callable[..., None]) -> None:
+    page.click("#verb-check")
+    page.wait_for_selector("[aria-label=Check] .verdict")
+    page.click("#verb-calibrate")
+    page.wait_for_selector("[aria-label=Calibration] table")
+    page.wait_for_selector("ol.timeline li.current:has-text('calibrated')")
+    assert figure(page.inner_text("ol.timeline li.current .chip")) <= AT_THE_NOISE
+    picture(page, "calibrated")
+
+
+def test_a_clear_verdict_offers_no_experiment_to_tell_models_apart(page: Any) -> None:
+    page.click("[aria-label=Results] button:has-text('diagnose')")
+    assert page.locator("#next-experiment").is_disabled()

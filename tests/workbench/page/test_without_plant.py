@@ -8,8 +8,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from page_steps import until
+from page_steps import drop, hidden_part, until
+from scipy.io import savemat
 
 PAGE = Path(__file__).parents[3] / "ros_ws/src/hydraulic_workbench/hydraulic_workbench/page"
 SAMPLE = Path(__file__).parents[3] / "examples" / "sample_bench"
@@ -92,7 +94,57 @@ def test_two_records_and_a_model_over_each_other(bench: Any, picture: Callable[.
     until(page, drawn, 2)
     page.select_option("#overlay-model", label="sample_bench")
     until(page, drawn, 3)
+    page.select_option("#overlay-other-model", label="moog_mcr_m_1002_bench")
+    until(page, drawn, 4)
     picture(page, "records-overlay")
+    page.uncheck("[aria-label='Show steps']")
+    until(page, drawn, 3)
+    titles = page.locator("[aria-label=Overlay] series-chart >> nth=0").locator(".legend span").all_inner_texts()
+    assert titles == ["multisine", "sample_bench on multisine", "moog_mcr_m_1002_bench on multisine"]
+
+
+def test_files_are_dropped_onto_the_page(bench: Any, tmp_path: Path) -> None:
+    lines = gzip.decompress((SAMPLE / "steps.csv.gz").read_bytes()).decode().splitlines()[:2001]
+    (tmp_path / "dropped.csv").write_text("\n".join(lines))
+    names = lines[0].split(",")
+    values = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+    short = ["t", "u", "x", "pa", "pb"]
+    savemat(tmp_path / "matlab.mat", dict(zip(short, values.T, strict=True)))
+    page = bench.open(tab="records")
+    drop(page, "[aria-label='Bring a record']", tmp_path / "dropped.csv")
+    page.wait_for_selector("[aria-label='Bring a record'] .notice.good:has-text('2000 samples')")  # its header says all
+    page.click("#finish-import:not([disabled])")
+    page.wait_for_selector("table.records th:has-text('dropped')")
+    drop(page, "[aria-label='Bring a record']", tmp_path / "matlab.mat")
+    page.wait_for_selector("table.columns-map")
+    for channel, column in (("time", "t"), ("drive", "u"), ("position", "x")):
+        page.select_option(f"[aria-label='Column of {channel}']", column)
+    page.select_option("[aria-label='Unit of position']", "m")
+    page.click("#finish-import:not([disabled])")
+    page.wait_for_selector("table.records tr:has-text('matlab'):has-text('columns:')")
+    found = {one["name"]: one for one in page.evaluate("workbench.state.records")}
+    assert len(names) == len(short) and found["dropped"]["samples"] == found["matlab"]["samples"] == 2000
+    assert {"drive", "position"} <= set(found["matlab"]["channels"])
+
+
+def test_the_real_bench_asks_and_says_what_is_missing(bench: Any, picture: Callable[..., None]) -> None:
+    page = bench.open(tab="plant")
+    assert page.input_value("#real-bus") == "bench"
+    assert page.input_value("#real-channel") == "can0"
+    page.fill("#real-channel", " ")
+    page.wait_for_selector("#start-real:disabled")  # it cannot be left open
+    page.fill("#real-channel", "can97")
+    page.click("#start-real")
+    asked = page.inner_text("dialog")
+    assert "can97" in asked and "emergency stop" in asked
+    page.click("dialog .primary")
+    until(page, "workbench.state.bench.plant.phase === 'failed'")
+    said = page.inner_text(".banner[role=alert]")
+    assert said.count("can97") == 1 and "Traceback" not in said and "[ERROR]" not in said
+    picture(page, "real-bench-missing")
+    page.evaluate("location.hash = '#/plant'")
+    page.click("#stop-plant")
+    until(page, "workbench.state.bench.plant.kind === 'none'")
 
 
 def test_foreign_text_stays_text(bench: Any) -> None:
@@ -141,4 +193,6 @@ def test_every_tab_fits_a_phone(bench: Any, picture: Callable[..., None]) -> Non
         wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
         assert wide <= 0, f"{tab}: the page is {wide} px too wide"
         assert page.locator("#stop").is_visible()
+        if tab == "records":
+            assert hidden_part(page, ".scroll:has(table.records)") <= 0, "Diagnose is cut off"
         picture(page, f"{tab}-phone")

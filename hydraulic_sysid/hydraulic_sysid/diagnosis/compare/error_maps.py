@@ -19,6 +19,7 @@ BINS = 32
 DIRECTION_EDGES: Array = np.array([-1.5, -0.5, 0.5, 1.5])
 """Of the bins of `directions`."""
 _SMALLEST_BIN = 20
+EDGE_DIGITS = 12  # that a result file keeps
 _BLOCK_SECONDS = 0.5
 _VANISHED = 0.05
 _CHANCE = 8.0  # three standard deviations of the cross-validated share of n independent samples stay below 8/n
@@ -28,6 +29,9 @@ _CHANCE = 8.0  # three standard deviations of the cross-validated share of n ind
 class ErrorMap:
     """Statistics ``(B,)`` of an error in bins of one variable, SI; bins with too few samples are left out."""
 
+    start: Array
+    """Least value of the variable in the bin; it holds what lies from there on and below `end`."""
+    end: Array
     center: Array
     count: Index
     mean: Array
@@ -84,11 +88,20 @@ class Binning:
         What lies beyond an end belongs to the end bin.
         """
         edges = adaptive_edges(values) if edges is None else edges
+        edges = np.array([float(f"{edge:.{EDGE_DIGITS}g}") for edge in edges])  # those of the document, to the last bit
         bins = max(edges.size - 1, 1)
         index = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
         order = np.argsort(index, kind="stable")
         starts = np.concatenate(([0], np.cumsum(np.bincount(index, minlength=bins))))
         return cls(values, edges, index, order, starts)
+
+    def reach(self) -> Array:
+        """``(B + 1,)`` between what values the bins lie; the end bins reach a little beyond all values."""
+        found = np.resize(self.edges, self.starts.size).astype(float)
+        low, high = min(found[0], float(self.values.min())), max(found[-1], float(self.values.max()))
+        room = 1e-6 * max(high - low, abs(high), abs(low))
+        found[0], found[-1] = low - room, high + room
+        return found
 
 
 def independent_samples(error: Array, folds: Index) -> float:
@@ -114,7 +127,8 @@ def error_map(error: Array, binning: Binning, folds: Index, independent: float |
     """
     independent = independent_samples(error, folds) if independent is None else independent
     rows = []
-    for first, last in zip(binning.starts[:-1], binning.starts[1:], strict=True):
+    ends = binning.reach()
+    for bin_, (first, last) in enumerate(zip(binning.starts[:-1], binning.starts[1:], strict=True)):
         inside = binning.order[first:last]
         e = error[inside]
         known = np.isfinite(e)
@@ -123,13 +137,15 @@ def error_map(error: Array, binning: Binning, folds: Index, independent: float |
             continue
         low, middle, high = np.quantile(e, (0.1, 0.5, 0.9))
         place = float(binning.values[inside][known].mean())
-        rows.append((place, e.size, float(e.mean()), middle, low, high, float(np.sqrt(np.mean(e**2)))))
-    table = np.array(rows, dtype=float).reshape(-1, 7)
+        rows.append(
+            (*ends[bin_ : bin_ + 2], place, e.size, float(e.mean()), middle, low, high, float(np.sqrt(np.mean(e**2))))
+        )
+    table = np.array(rows, dtype=float).reshape(-1, 9)
     known = np.isfinite(error)
     share = cross_validated_share(error[known], binning.index[known], folds[known], binning.starts.size - 1)
-    center, count, mean, median, low, high, rms = table.T
+    start, end, center, count, mean, median, low, high, rms = table.T
     chance = min(1.0, _CHANCE / max(independent, 1.0))
-    return ErrorMap(center, count.astype(np.int64), mean, median, low, high, rms, share, chance)
+    return ErrorMap(start, end, center, count.astype(np.int64), mean, median, low, high, rms, share, chance)
 
 
 def cross_validated_share(error: Array, index: Index, folds: Index, bins: int) -> float:

@@ -18,5 +18,5 @@ def write_samples(compared: Sequence[Compared], file: Path) -> None:
     for place, c in enumerate(compared):
         arrays[f"{place}/time"] = c.data.record.time
         arrays |= {f"{place}/error/{name}": c.error("horizon", name).astype(np.float32) for name in c.data.compared}
-        arrays |= {f"{place}/variable/{n}": values.astype(np.float32) for n, values in variables_of(c).items()}
+        arrays |= {f"{place}/variable/{n}": values for n, values in variables_of(c).items()}
     np.savez(file, **arrays)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hydraulic_interfaces.contract import ESTIMATOR_NODE, absolute
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.display import SHOWN
 from hydraulic_workbench.board import Board
@@ -218,6 +219,11 @@ class Bench:
         hidden = {self.guess.effect: self.guess.values}
         self.plant.begin(Chosen(GUESS, "simulator with a secret", model.file, model.id, hidden, lockstep=lockstep))
 
+    async def choose_live_model(self, model: Entry | None) -> None:
+        """Run another model beside the plant, or none; what the one before said is forgotten."""
+        await self.live_model.choose(model)
+        self.health.forget(absolute(ESTIMATOR_NODE, self.graph.namespace))
+
     def riddle(self) -> Guess:
         """The riddle that is on.
 
@@ -258,6 +264,8 @@ class Bench:
                 self.experiments.event["now_ns"] = self._intake.newest_ns
             if count % _HEALTH_EVERY == 0:
                 self.board.put("health", self._health())
+                estimate = self.health.values(f"{absolute(ESTIMATOR_NODE, self.graph.namespace)}: estimate")
+                self.live_model.says(number(estimate, "position_residual_rms_m"))
 
     def _health(self) -> dict[str, Any]:
         own = f"{self.graph.namespace}/plant"

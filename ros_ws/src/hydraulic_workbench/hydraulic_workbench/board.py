@@ -18,7 +18,7 @@ class Board:
             "plant": {"kind": "none", "name": "", "model": None, "phase": "stopped", "text": "no plant runs"},
             "health": {"level": "stale", "rows": []},
             "experiment": {"phase": "idle", "text": ""},
-            "live_model": {**OFF, "model": None, "name": ""},
+            "live_model": {**OFF, "model": None, "name": "", "residual": None},
             "controller": {**OFF, "law": None, "active": False, "can_undo": False},
             "reference": {**OFF, "kind": None},
             "current_model": None,

@@ -40,6 +40,10 @@ class HealthBoard:
         self.rows |= {row.name: row for row in rows}
         self.rows = {name: row for name, row in self.rows.items() if now - row.heard < FORGOTTEN_S}
 
+    def forget(self, node: str) -> None:
+        """Drop the rows of a node that another one replaces."""
+        self.rows = {name: row for name, row in self.rows.items() if not name.startswith(f"{node}: ")}
+
     def values(self, name: str) -> Mapping[str, str]:
         """Values of a row; empty where there is none, or it is stale."""
         row = self.rows.get(name)

@@ -10,6 +10,7 @@ from typing import Any
 from hydraulic_bringup.demo.processes import Child
 from hydraulic_control.gains_file import shipped as shipped_gains
 from hydraulic_control.laws import laws
+from hydraulic_control.reference_parameters import PARAMETERS
 from hydraulic_interfaces.contract import CONTROLLER_NODE, REFERENCE_NODE
 from hydraulic_workbench.board import OFF, Board
 from hydraulic_workbench.calls import Graph, NoAnswerError, NodeParameter, Said
@@ -63,6 +64,7 @@ class LiveModel:
     """The model beside the plant: the estimator, with the model that a page chooses."""
 
     def __init__(self, board: Board, processes: Processes) -> None:
+        self._board = board
         self.node = Follower("live_model", "hydraulic_sysid.nodes.estimator", board, processes)
 
     async def choose(self, model: Entry | None) -> None:
@@ -71,6 +73,10 @@ class LiveModel:
             await self.node.stop()
         else:
             await self.node.start({"model": str(model.file)}, model=model.id, name=model.document()["name"])
+
+    def says(self, residual: float | None) -> None:
+        """Put on the board what the node says of its residual: RMS of the position [m]."""
+        self._board.change("live_model", residual=residual if self.node.running else None)
 
 
 class Controller:
@@ -151,6 +157,10 @@ PATIENT: dict[str, object] = {"lockstep": True, "use_sim_time": True, "age_limit
 """Of a controller whose plant waits for it."""
 
 
+WHOLE = frozenset(p.name for p in PARAMETERS if type(p.default) is int)
+"""Parameters of the reference that are whole numbers."""
+
+
 class Reference:
     """The reference that the controller follows."""
 
@@ -165,7 +175,7 @@ class Reference:
             raise WorkbenchError(f"kind is {kind!r}; it must be the name of a trajectory", "kind")
         if not all(str(k).isidentifier() and isinstance(v, int | float) for k, v in given.items()):
             raise WorkbenchError(f"values is {values!r}; it must be {{parameter: number}}", "values")
-        numbers = {k: float(v) for k, v in given.items()}
+        numbers = {k: round(v) if k in WHOLE else float(v) for k, v in given.items()}
         patient = {"use_sim_time": True, "state_timeout": 10.0} if self._lockstep() else {}
         await self.node.start(
             {"kind": kind, "autostart": True, "exit_when_done": True, **numbers, **patient}, kind=kind

@@ -17,7 +17,7 @@ from hydraulic_node_utils.whole_file import write_text
 from hydraulic_workbench.errors import UnknownError, WorkbenchError
 from hydraulic_workbench.folder import Folder
 from hydraulic_workbench.hub import Hub
-from hydraulic_workbench.processes import Processes, nicer
+from hydraulic_workbench.processes import Processes, interrupt, nicer
 from hydraulic_workbench.progress_log import ProgressLog
 from hydraulic_workbench.verbs_of_jobs import VERBS, Asked, command
 
@@ -122,17 +122,20 @@ class Jobs:
         return job
 
     async def cancel(self, job: Job) -> None:
-        """End it: at once where it waits; a diagnosis ends with the best so far.
+        """End it: at once where it waits. A diagnosis may take its time to end with the best so far, until asked twice.
 
         :raises WorkbenchError: it is over.
         """
         if job.over:
             raise WorkbenchError(f"{job.title} is over")
-        job.cancelled = True
+        again, job.cancelled = job.cancelled, True
         if job.child is not None:
             job.progress = "ending …"
             self._tell(job)
             child = job.child
+            if VERBS[job.verb].ends_early and not again:
+                interrupt(child)
+                return
             task = asyncio.create_task(self._processes.stop(child))
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
@@ -22,6 +23,12 @@ from hydraulic_workbench.processes import Processes
 
 START_S = 300.0  # the first start on a machine compiles the physics
 NOTHING = Chosen("none", "", lockstep=False)
+
+
+def plain_words(tail: str) -> str:
+    """The last lines of a node's log, each once, without the marks of the log: margin, level, time and node."""
+    mark = re.compile(r"^ *\| (?:\[[A-Z]+\] \[[\d.]+\] \[[\w./]+\]: )?")
+    return "\n".join(dict.fromkeys(mark.sub("", line) for line in tail.splitlines()))
 
 
 class Plant:
@@ -88,7 +95,7 @@ class Plant:
                 raise WorkbenchError(f"the simulator refuses the hidden effects: {said.message}", "hidden")
         for transition in ("configure", "activate"):
             if not await self._asked_while_alive(self._graph.change_state(PLANT_NODE, transition, START_S)):
-                raise WorkbenchError(f"the plant did not {transition}:\n{self._child.tail()}")
+                raise WorkbenchError(f"the plant did not {transition}:\n{plain_words(self._child.tail())}")
 
     async def _wait_for_devices(self, child: Child) -> None:
         deadline = time.monotonic() + START_S
@@ -105,7 +112,8 @@ class Plant:
             while not asked.done():
                 await asyncio.wait({asked}, timeout=0.1)
                 if self._child.exit_code is not None:
-                    raise WorkbenchError(f"the plant ended while it was started:\n{self._child.tail()}")
+                    said = plain_words(self._child.tail())
+                    raise WorkbenchError(f"the plant ended while it was started:\n{said}")
             return asked.result()
         finally:
             asked.cancel()

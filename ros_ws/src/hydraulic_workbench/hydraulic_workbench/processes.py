@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from hydraulic_bringup.demo.processes import Child
@@ -45,6 +47,12 @@ class Processes:
                 return False
             await asyncio.sleep(0.05)
         return True
+
+
+def interrupt(child: Child) -> None:
+    """Ask a process and what it has started to come to an end, as Ctrl-C does; it takes the time that it needs."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(child.pid, signal.SIGINT)
 
 
 def nicer(child: Child, by: int) -> None:

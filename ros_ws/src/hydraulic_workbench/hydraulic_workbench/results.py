@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hydraulic_sysid.data.results import PAGE, read_folder
+from hydraulic_sysid.data.results import PAGE, read_folder, verb_of
 from hydraulic_workbench.errors import UnknownError
 from hydraulic_workbench.folder import Folder
 from hydraulic_workbench.jobs import Jobs
@@ -59,8 +59,14 @@ class Results:
 
 
 def errors_of(folder: Path) -> tuple[float | None, float | None, str | None]:
-    """Residual over noise on validation data before and after, and the effects that the last run in it has added."""
+    """Residual over noise before and after the last run in it, and the effects that it has added.
+
+    On validation data where effects were added; of a calibration on its test records, else on those it was fitted to.
+    """
     found = read_folder(folder)[-1]
+    if verb_of(found) == "calibrate":
+        judged = found.get("test") or found["fit"]
+        return float(judged["before"]), float(judged["after"]), None
     residual = found.get("residual")
     if not isinstance(residual, dict):
         return None, None, None

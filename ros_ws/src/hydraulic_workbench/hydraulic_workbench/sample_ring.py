@@ -94,7 +94,8 @@ class SampleRing:
         keep = min(self._capacity, self._stamps.size - rows, self._count)
         start = self._count - keep
         self._stamps[:keep] = self._stamps[start : self._count]
-        self._values[:, :keep] = self._values[:, start : self._count].copy()
+        for column in self._values:  # one by one: the heap keeps the room of a copy of all
+            column[:keep] = column[start : self._count]
         self._first, self._count = self._first + start, keep
 
     def complete(self, awaited: Sequence[int]) -> int:

@@ -108,6 +108,8 @@ class Verb:
     heavy: bool = True
     leads_to_model: str = ""
     """What the timeline says of the model that it writes; empty where it writes none, or none by itself."""
+    ends_early: bool = False
+    """Whether it ends with the best so far when it is interrupted."""
 
 
 VERBS: dict[str, Verb] = {
@@ -115,7 +117,7 @@ VERBS: dict[str, Verb] = {
     "check": Verb(lambda asked: ["--check", *_model_and_records(asked)], heavy=False),
     "compare": Verb(lambda asked: [*_model_and_records(asked), "--samples"], heavy=False),
     "locate": Verb(_model_and_records, heavy=False),
-    "diagnose": Verb(_diagnose),
+    "diagnose": Verb(_diagnose, ends_early=True),
     "add": Verb(_add, leads_to_model="added"),
     "next_experiment": Verb(_next_experiment),
     "identify": Verb(lambda asked: asked.record_options(), heavy=False),

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from hydraulic_sysid.data.decimation import envelope
+from hydraulic_sysid.data.display import TITLES
 from hydraulic_sysid.data.results import plain, read_folder, verb_of
 from hydraulic_workbench.errors import UnknownError, WorkbenchError
 
 BULKY = ("spectra", "error_growth", "spectrum", "lag", "cross_lag", "autocorrelation",
          "exact_autocorrelation", "cross_correlation", "software", "description")  # fmt: skip
-"""Entries that only figures need; those that the page draws itself stay."""
+"""Entries that only figures need, where they are more than a text; those that the page draws itself stay."""
 SAMPLES = "samples.npz"
 
 
@@ -36,8 +37,10 @@ def summary(folder: Path) -> dict[str, Any]:
 
 
 def document(folder: Path, whole: bool) -> dict[str, Any]:
-    """The last result of a run."""
+    """The last result of a run, and which ``model_files`` lie beside it."""
     found = _results(folder)[-1]
+    files = sorted(file.name for file in (*folder.glob("model.yaml"), *folder.glob("competing_*.yaml")))
+    found = {**found, "model_files": files}
     if whole:
         return found
     slim: dict[str, Any] = _without(found)
@@ -48,7 +51,7 @@ def document(folder: Path, whole: bool) -> dict[str, Any]:
 
 def _without(value: Any) -> Any:
     if isinstance(value, dict):
-        return {k: _without(v) for k, v in value.items() if k not in BULKY}
+        return {k: _without(v) for k, v in value.items() if k not in BULKY or isinstance(v, str)}
     return [_without(v) for v in value] if isinstance(value, list) else value
 
 
@@ -83,7 +86,7 @@ def figure(folder: Path, name: str) -> str:
 
 
 def samples(folder: Path, channel: str, variable: str, low: float, high: float, points: int) -> dict[str, Any]:
-    """The samples of a comparison at which a variable lies between two values: where they are, and their errors.
+    """The samples of a comparison at which a variable is at least ``low`` and below ``high``: where, and their errors.
 
     :raises WorkbenchError: the run has kept no samples, or not of these.
     """
@@ -100,13 +103,14 @@ def samples(folder: Path, channel: str, variable: str, low: float, high: float, 
             if any(key not in kept for key in keys):
                 raise WorkbenchError(f"{name} has no {channel} over {variable}", "channel")
             time, error, value = (kept[key] for key in keys)
-            inside = (value >= low) & (value <= high) & np.isfinite(error)
+            inside = (value >= low) & (value < high) & np.isfinite(error)
             segments += _segments(name, time, inside)
             rows.append((index, time[inside], error[inside], value[inside]))
     segments.sort(key=lambda s: -s["count"])
     total = sum(time.size for _, time, _, _ in rows)
     found = _thinned(rows, max(points // max(len(rows), 1), 50))
-    text = f"{total} samples of {channel.replace('_', ' ')} with {variable.replace('_', ' ')} in that range"
+    titles = [TITLES.get(name, name.replace("_", " ")) for name in (channel, variable)]
+    text = f"{total} samples of {titles[0]} with {titles[1]} in that range"
     return plain({"segments": segments[:200], "samples": found, "count": total, "text": text})
 
 

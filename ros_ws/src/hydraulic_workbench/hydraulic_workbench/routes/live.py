@@ -20,7 +20,7 @@ def routes(bench: Bench) -> list[web.AbstractRouteDef]:
 
     async def live_model(request: web.Request) -> web.Response:
         wanted = (await asked(request)).get("model")
-        await bench.live_model.choose(bench.model(wanted) if wanted else None)
+        await bench.choose_live_model(bench.model(wanted) if wanted else None)
         return answer(status=202)
 
     async def choices(_: web.Request) -> web.Response:
@@ -81,7 +81,8 @@ def references() -> list[dict[str, Any]]:
         own = getattr(trajectory, "__dataclass_fields__", {})
         parameters: list[Any] = [
             {"name": s.name, "value": s.default, "unit": s.unit, "minimum": s.minimum, "maximum": s.maximum,
-             "description": s.description, "live": s.live, "display": display(s.unit), "choices": None}
+             "description": s.description, "live": s.live, "display": display(s.unit), "choices": None,
+             "whole": type(s.default) is int}
             for s in numbers
             if s.name in own
         ]  # fmt: skip

@@ -95,9 +95,16 @@ def routes(bench: Bench) -> list[web.AbstractRouteDef]:
 def _chosen(bench: Bench, kind: str, wanted: dict[str, Any], lockstep: bool) -> Chosen:
     if kind == CAN:
         name = str(wanted.get("bus") or "bench")
-        load_bus(name)  # refuses one that cannot be read
+        bus = load_bus(name)  # refuses one that cannot be read
         interface, channel = (str(wanted.get(key) or "") for key in ("interface", "channel"))
-        return Chosen(CAN, f"bench on {name}", bus=name, interface=interface, channel=channel, lockstep=False)
+        return Chosen(
+            CAN,
+            f"real bench on {channel or bus.channel}",
+            bus=name,
+            interface=interface,
+            channel=channel,
+            lockstep=False,
+        )
     model = bench.model(wanted.get("model"))
     chosen = Chosen(kind, f"simulator of {model.document()['name']}", model.file, model.id, lockstep=lockstep)
     if kind == SIMULATOR:

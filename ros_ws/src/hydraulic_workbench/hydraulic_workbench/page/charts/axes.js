@@ -2,6 +2,8 @@
 import { css } from "./colours.js";
 import { digits } from "../core/format.js";
 
+/** Width of a value axis. */
+export const AXIS_PX = 54;
 const FONT = '11.5px system-ui, "DejaVu Sans", sans-serif';
 
 export function axis(more = {}) {
@@ -16,7 +18,7 @@ export function axis(more = {}) {
 }
 
 /** A value axis as wide as its neighbours', so that plots stand in line. */
-export const valueAxis = (more = {}) => axis({ size: 54, space: 22, values: (_, ticks) => labels(ticks), ...more });
+export const valueAxis = (more = {}) => axis({ size: AXIS_PX, space: 22, values: (_, ticks) => labels(ticks), ...more });
 
 /** Labels of ticks, all with as many places as the distance between them asks for. */
 function labels(ticks) {

@@ -3,7 +3,7 @@ import { html } from "../core/html.js";
 import { digits } from "../core/format.js";
 
 /**
- * `map`: {center, mean, low, high, count} in SI; `value` and `error` say how both are shown ({factor, unit, title});
+ * `map`: {start, end, center, mean, low, high, count} in SI; `value` and `error` say how both are shown ({factor, unit, title});
  * `chosen` is the number of the bin that is open; `choose(bin, low, high)` opens one.
  */
 export function errorMap({ map, value, error, chosen, choose }) {
@@ -11,7 +11,6 @@ export function errorMap({ map, value, error, chosen, choose }) {
   if (!bins.length) return html`<p class="soft small">No samples.</p>`;
   const most = Math.max(...bins.flatMap((k) => [Math.abs(map.low[k] ?? 0), Math.abs(map.high[k] ?? 0), Math.abs(map.mean[k])]), 1e-30);
   const top = (y) => `${50 - (46 * Math.max(-1.05, Math.min(1.05, y / most)))}%`;
-  const edge = (k, side) => edgeOf(map.center, k, side);
   const text = (k) => `${value.title} ${digits(map.center[k] * value.factor, 3)} ${value.unit}: mean error `
     + `${digits(map.mean[k] * error.factor, 3)} ${error.unit}, ${map.count[k]} samples`;
   return html`<div class="map" role="group" aria-label=${`Error of ${error.title} over ${value.title}`}>
@@ -19,7 +18,7 @@ export function errorMap({ map, value, error, chosen, choose }) {
     <div class="bins">
       <span class="zero" style="top:50%"></span>
       ${bins.map((k) => html`<button aria-pressed=${chosen === k} title=${text(k)} aria-label=${text(k)}
-          @click=${() => choose(k, edge(k, -1), edge(k, 1))}>
+          @click=${() => choose(k, map.start[k], map.end[k])}>
         <span class="spread" style=${`top:${top(map.high[k] ?? map.mean[k])};bottom:calc(100% - ${top(map.low[k] ?? map.mean[k])})`}></span>
         <span class="mean" style=${`top:${top(map.mean[k])}`}></span>
       </button>`)}
@@ -27,10 +26,4 @@ export function errorMap({ map, value, error, chosen, choose }) {
     <div class="under"><span>${digits(map.center[bins[0]] * value.factor, 3)}</span><span>${value.title} [${value.unit}]</span>
       <span>${digits(map.center[bins[bins.length - 1]] * value.factor, 3)}</span></div>
   </div>`;
-}
-
-/** Half way to the neighbour; beyond the ends as far as on the other side. */
-function edgeOf(center, k, side) {
-  const other = center[k + side] ?? 2 * center[k] - (center[k - side] ?? center[k]);
-  return (center[k] + other) / 2;
 }

@@ -11,11 +11,12 @@ const dashed = (key) => (key.startsWith("reference") ? [5, 4] : undefined);
 
 export class LivePanel {
   /** `spec`: {title, columns, second} — with `second` the last column has an axis of its own, at the right. */
-  constructor(spec, owner, { height, last }) {
+  constructor(spec, owner, { height, last, right }) {
     this.spec = spec;
     this.owner = owner;
     this.height = height;
     this.last = last;
+    this.right = right; // room beside the plot, so that panels with a second axis stand in line with those without
     this.muted = owner.muted;
     this.element = document.createElement("section");
     this.element.className = "panel";
@@ -97,7 +98,7 @@ export class LivePanel {
     const owner = this.owner;
     this.plot = new uPlot({
       width, height: this.height, legend: { show: false }, scales, axes, series: [{}, ...series],
-      padding: [6, this.spec.second ? 0 : 10, this.last ? 0 : 6, 0],
+      padding: [6, this.spec.second ? 0 : this.right, this.last ? 0 : 6, 0],
       cursor: {
         sync: { key: owner.sync, setSeries: false }, y: false, points: { size: 6 },
         drag: { x: true, y: false, setScale: false, dist: 6 },
@@ -149,6 +150,8 @@ export class LivePanel {
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
+      ctx.textAlign = "left"; // the axes leave others behind
+      ctx.textBaseline = "alphabetic";
       ctx.font = `bold ${11 * devicePixelRatio}px sans-serif`;
       ctx.fillText(name, x + 4, bbox.top + 11 * devicePixelRatio);
       ctx.restore();

@@ -2,6 +2,7 @@
 import { live, onEpoch } from "../core/stream.js";
 import { changed } from "../core/store.js";
 import { LivePanel } from "./live_panel.js";
+import { AXIS_PX } from "./axes.js";
 
 const SAID_EVERY_MS = 120;
 const HEIGHTS = { position: 190, overlay: 190 };
@@ -104,9 +105,10 @@ export class LiveStrips extends HTMLElement {
   arrange() {
     this.clear();
     const specs = this.specs();
+    const right = specs.some((spec) => spec.second) ? AXIS_PX : 20;
     this.panels = specs.map((spec, k) => {
       const last = k === specs.length - 1;
-      return new LivePanel(spec, this, { height: (HEIGHTS[spec.group] ?? 132) + (last ? 24 : 0), last });
+      return new LivePanel(spec, this, { height: (HEIGHTS[spec.group] ?? 132) + (last ? 24 : 0), last, right });
     });
     this.append(...this.panels.map((panel) => panel.element));
     this.fit();

@@ -180,6 +180,7 @@ export class SeriesChart extends HTMLElement {
       ctx.stroke();
       if (!line.title) continue;
       ctx.font = `${11 * devicePixelRatio}px sans-serif`;
+      ctx.textBaseline = "alphabetic"; // the axes leave another one behind
       ctx.textAlign = line.left ? "left" : "right";
       const upper = y < bbox.top + bbox.height / 2;
       const below = line.left ? !upper : upper; // a limit's name inside its limit, that of the stroke's end outside

@@ -22,7 +22,7 @@ const minus = (text) => text.replace(/-/g, "−");
 export function shown(value, display, count = 4) {
   if (value === null || value === undefined) return "–";
   const { factor = 1, unit = "" } = display || {};
-  return `${digits(value * factor, count)}${unit ? ` ${unit}` : ""}`;
+  return `${digits(value * factor, count)}${unit ? ` ${unit.replaceAll("*", "·")}` : ""}`;
 }
 
 /** "9.42 × noise". */

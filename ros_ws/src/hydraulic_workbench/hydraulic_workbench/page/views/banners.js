@@ -20,7 +20,7 @@ function stopped() {
 function failed() {
   const now = plant();
   if (now.phase !== "failed") return nothing;
-  return html`<div class="banner" role="alert"><span><strong>The plant ended.</strong> ${now.text}</span></div>`;
+  return html`<div class="banner" role="alert"><span><strong>The plant failed.</strong> ${now.text}</span></div>`;
 }
 
 function offline() {

@@ -81,8 +81,8 @@ function field(parameter, change) {
   const outside = parameter.minimum !== null && parameter.minimum !== undefined && parameter.maximum !== null && parameter.maximum !== undefined
     ? `${digits(parameter.minimum * factor, 3)} … ${digits(parameter.maximum * factor, 3)} ${unit}` : "";
   return html`<label class="field slider" title=${[parameter.description, outside].filter(Boolean).join(" · ")}>
-    <span class="row spread"><span>${words(parameter.name)}</span><b>${digits(parameter.value * factor, 4)} ${unit}</b></span>
-    <input type="range" min=${low} max=${high} step=${(high - low) / 200} .value=${String(parameter.value)} ?disabled=${!operates()}
+    <span class="row spread"><span>${words(parameter.name)}</span><b>${parameter.whole ? parameter.value : digits(parameter.value * factor, 4)} ${unit}</b></span>
+    <input type="range" min=${low} max=${high} step=${parameter.whole ? 1 : (high - low) / 200} .value=${String(parameter.value)} ?disabled=${!operates()}
       @input=${(event) => change(parameter, Number(event.target.value))}></label>`;
 }
 
@@ -101,7 +101,7 @@ function law() {
   const parameters = (state.gains?.parameters ?? []).filter((one) => one.live);
   return html`<div class="row spread"><strong>${words(now.law)}</strong>
       <span class="row"><button class="small" id="undo-gains" ?disabled=${!operates() || !now.can_undo} @click=${undo}>${undoIcon()}Undo</button>
-      <button class="small" ?disabled=${!operates()} @click=${() => attempt(() => post("/api/controller/stop"))}>Stop</button></span></div>
+      <button class="small" id="stop-controller" ?disabled=${!operates()} @click=${() => attempt(() => post("/api/controller/stop"))}>Stop</button></span></div>
     <div class="stack tight gains">${parameters.map((one) => field(one, set))}</div>`;
 }
 

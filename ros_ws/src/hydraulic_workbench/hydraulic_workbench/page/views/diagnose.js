@@ -77,7 +77,7 @@ function history(shown) {
 
 function running(job) {
   return html`<section class="card" aria-label="Progress"><header><h2>${job.title}</h2>
-      <button class="small" id="cancel-job" ?disabled=${!operates()} @click=${() => cancelJob(job)}>${job.verb === "diagnose" ? "Finish now" : "Cancel"}</button></header>
+      <button class="small" id="cancel-job" ?disabled=${!operates()} @click=${() => cancelJob(job)}>${job.verb === "diagnose" && !job.progress?.startsWith("ending") ? "Finish now" : "Cancel"}</button></header>
     <progress aria-label="Running"></progress>
     <p class="row spread progress-text"><span>${job.progress || words(job.phase)}</span><span class="soft">${duration(job.seconds)}</span></p>
     ${falling(job)}

@@ -85,11 +85,12 @@ export function diagnosisResult(doc, job) {
       ${fallingSteps(residualSteps(doc))}
       ${added ? nothing : html`<div class="row" style="margin-top:12px">
         ${canApply ? html`<button id="apply" ?disabled=${!operates() || anyRuns()} @click=${() => applyVerdict(job.run)}>Take the model of the verdict</button>` : nothing}
-        <button id="next-experiment" ?disabled=${!operates() || anyRuns()} title="Design the experiment that tells the candidates apart" @click=${() => nextExperiment(job)}>Next experiment</button>
+        <button id="next-experiment" ?disabled=${!operates() || anyRuns() || doc.model_files.length < 2}
+          title=${doc.model_files.length < 2 ? "These records leave one model: there is nothing to tell apart" : "Design the experiment that tells the candidates apart"} @click=${() => nextExperiment(job)}>Next experiment</button>
         ${stale ? html`<span class="soft small">The model has changed since.</span>` : nothing}</div>`}
       ${dataSheet(doc)}${recording(doc)}${findings(doc)}
     </section>
     ${added ? nothing : html`<section class="card flush" aria-label="Candidates"><header><h2>Candidates</h2><span class="soft small">a row opens on a click</span></header>
       ${candidateTable(rows(job, doc), { doc, add: (name) => addEffect(job, name), busy: anyRuns() })}</section>`}
-    ${beforeAfter(doc)}`;
+    ${beforeAfter(doc, job.run)}`;
 }

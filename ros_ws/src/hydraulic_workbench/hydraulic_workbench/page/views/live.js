@@ -3,9 +3,10 @@ import { html, nothing, ref } from "../core/html.js";
 import { state, changed } from "../core/store.js";
 import { post } from "../core/api.js";
 import { attempt } from "../core/messages.js";
-import { live, column } from "../core/stream.js";
+import { live } from "../core/stream.js";
 import { operates, plantRuns, open } from "../core/actions.js";
 import { digits } from "../core/format.js";
+import { displayOf } from "../core/quantities.js";
 import { pauseIcon, playIcon } from "../core/icons.js";
 import "../charts/live_strips.js";
 import { health } from "./health.js";
@@ -58,7 +59,7 @@ function cursors() {
     <div class="scroll"><table class="cursors"><thead><tr><th>Channel</th><th class="number">A</th><th class="number">B</th><th class="number">B − A</th></tr></thead>
       <tbody><tr><th>time [s]</th><td class="number">${digits(A, 5)}</td><td class="number">${B === null ? "–" : digits(B, 5)}</td>
         <td class="number">${B === null ? "–" : digits(B - A, 4)}</td></tr>
-      ${strips.readings().map(({ column: one, a, b }) => html`<tr><th>${one.title} [${one.display.unit}]</th>
+      ${strips.readings().map(({ column: one, a, b }) => html`<tr><th>${one.title} <span class="soft">${one.display.unit}</span></th>
         <td class="number">${digits(a * one.display.factor)}</td><td class="number">${digits(b * one.display.factor)}</td>
         <td class="number">${digits((b - a) * one.display.factor)}</td></tr>`)}</tbody></table></div>
   </section>`;
@@ -69,7 +70,7 @@ const chooseModel = (event) => attempt(() => post("/api/live_model", { model: ev
 /** The model that runs beside the plant, and how far they are apart now. */
 function liveModel() {
   const now = state.bench.live_model ?? { phase: "off" };
-  const shown = column("residual_position");
+  const display = displayOf("m");
   return html`<section class="card"><header><h2>Model beside the plant</h2>
       ${now.phase === "running" ? html`<span class="chip good"><i class="dot"></i>running</span>` : nothing}
       ${now.phase === "starting" ? html`<span class="chip accent"><i class="spinner"></i>starting</span>` : nothing}</header>
@@ -78,27 +79,12 @@ function liveModel() {
         <option value="" ?selected=${!now.model}>none</option>
         ${state.models.map((model) => html`<option value=${model.id} ?selected=${model.id === now.model}>${model.name}</option>`)}
       </select></label>
-    ${now.phase === "running" && shown
-      ? html`<p class="residual"><b>${digits(residualNow() * shown.display.factor, 3)}</b> ${shown.display.unit}
-          <span class="soft">residual, root mean square of the last 2 s</span></p>`
+    ${now.phase === "running"
+      ? html`<p class="residual"><b>${Number.isFinite(now.residual) ? digits(now.residual * display.factor, 3) : "–"}</b> ${display.unit}
+          <span class="soft">residual of the position, root mean square of the last 2 s</span></p>`
       : html`<p class="soft small" style="margin-top:8px">It runs on the applied drive; the residual is measured − predicted.</p>`}
     ${now.text ? html`<p class="soft small">${now.text}</p>` : nothing}
   </section>`;
-}
-
-/** Root mean square of the position's residual on screen. */
-function residualNow() {
-  const ring = live.ring;
-  const all = ring.values.get("residual_position");
-  if (!all || !ring.length) return NaN;
-  let sum = 0;
-  let count = 0;
-  for (let k = ring.place(ring.newest - 2); k < ring.end; k++) {
-    if (all[k] !== all[k]) continue;
-    sum += all[k] * all[k];
-    count += 1;
-  }
-  return Math.sqrt(sum / count);
 }
 
 export function liveView() {

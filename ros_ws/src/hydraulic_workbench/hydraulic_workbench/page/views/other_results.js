@@ -1,6 +1,6 @@
 // Results that need no picture of their own.
 import { html, nothing } from "../core/html.js";
-import { update } from "../core/store.js";
+import { state, update } from "../core/store.js";
 import { open } from "../core/actions.js";
 import { digits, percent, words } from "../core/format.js";
 import { quantity } from "../core/quantities.js";
@@ -22,13 +22,13 @@ export function calibrateResult(doc) {
     <p class="verdict ${doc.verdict.level}">${doc.verdict.text}</p>
     ${fallingSteps([{ value: over(doc.fit?.before), title: "before" }, { value: over(doc.fit?.after), title: "after" }])}
     <div class="scroll"><table><thead><tr><th>Parameter</th><th class="number">Before</th><th class="number">After</th><th class="number">± standard error</th><th></th></tr></thead>
-      <tbody>${moved.map((one) => html`<tr><th>${words(one.key)}</th><td class="number">${quantity(one.before, one.unit)}</td><td class="number">${quantity(one.value, one.unit)}</td>
+      <tbody>${moved.map((one) => html`<tr><th>${words(one.key).replace(".", ": ")}</th><td class="number">${quantity(one.before, one.unit)}</td><td class="number">${quantity(one.value, one.unit)}</td>
         <td class="number">${one.standard_error === null ? "–" : quantity(one.standard_error, one.unit, 2)}</td>
         <td>${one.identifiable ? nothing : html`<span class="chip fair">not identifiable</span>`}${one.at_bound ? html`<span class="chip poor">at ${one.at_bound} bound</span>` : nothing}</td></tr>`)}</tbody></table></div></section>`;
 }
 
-export function nextExperimentResult(doc) {
-  const toTab = () => { update({ plan: null }); open("experiment"); };
+export function nextExperimentResult(doc, job) {
+  const toTab = () => { update({ plan: state.plans.find((plan) => plan.run === job.run)?.id ?? null }); open("experiment"); };
   return html`<section class="card" aria-label="Next experiment"><header><h2>The next experiment</h2>
       <button class="primary" id="to-experiment" @click=${toTab}>To the experiment</button></header>
     <p class="verdict ${doc.verdict?.level ?? ""}">${doc.verdict?.text}</p>

@@ -9,14 +9,14 @@ import "../charts/series_chart.js";
 
 const POINTS = 1600;
 const DEFAULT = ["position", "drive", "command", "pressure_a", "pressure_b"];
-const COLOURS = ["curve-1", "curve-2", "curve-3"];
+const COLOURS = ["curve-1", "curve-2", "curve-3", "curve-4"];
 const now = { key: "", charts: [], busy: false, channels: null, span: null, align: false };
 let timer = null;
 
 function items() {
   const records = state.shownRecords.map((id) => `record:${id}`);
-  const model = state.overlayModel ? [`model:${state.overlayModel}@record:${state.shownRecords[0]}`] : [];
-  return [...records, ...model];
+  const models = [...new Set(state.overlayModels)].filter(Boolean).map((model) => `model:${model}@record:${state.shownRecords[0]}`);
+  return [...records, ...models];
 }
 
 const available = () => [...new Set(state.shownRecords.flatMap((id) => recordOf(id)?.channels ?? []))];
@@ -74,15 +74,21 @@ function toggle(name) {
   changed();
 }
 
+/** A model that runs on the drive of the first record; a second one once there is a first. */
+function modelMenu(place) {
+  const put = (event) => update({ overlayModels: state.overlayModels.with(place, event.target.value) });
+  return html`<select aria-label=${place ? "Another model over the record" : "Model over the record"} id=${place ? "overlay-other-model" : "overlay-model"} @change=${put}>
+    <option value="">${place ? "no other model" : "no model"}</option>
+    ${state.models.map((model) => html`<option value=${model.id} ?selected=${model.id === state.overlayModels[place]}>${model.name}</option>`)}</select>`;
+}
+
 export function overlayView() {
   queueMicrotask(fetchAll);
   const names = state.shownRecords.map((id) => recordOf(id)?.name).filter(Boolean);
   return html`<section class="card" aria-label="Overlay" aria-busy=${now.busy || wanted() !== now.key}><header><h2>${names.join(" over ")}</h2>
       ${now.busy ? html`<i class="spinner"></i>` : nothing}
       ${now.span ? html`<button class="small" @click=${whole}>Whole record</button>` : nothing}
-      <select aria-label="Model over the record" id="overlay-model" @change=${(event) => update({ overlayModel: event.target.value })}>
-        <option value="">no model</option>
-        ${state.models.map((model) => html`<option value=${model.id} ?selected=${model.id === state.overlayModel}>${model.name}</option>`)}</select>
+      ${modelMenu(0)}${state.overlayModels[0] ? modelMenu(1) : nothing}
       <details class="menu"><summary class="button">Channels</summary><div class="card popup stack tight">
         ${available().map((name) => html`<label class="check"><input type="checkbox" .checked=${channels().includes(name)}
           @change=${() => toggle(name)}> ${words(name)}</label>`)}</div></details></header>

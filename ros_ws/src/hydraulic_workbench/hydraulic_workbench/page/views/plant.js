@@ -4,12 +4,12 @@ import { get, post } from "../core/api.js";
 import { state, update, changed } from "../core/store.js";
 import { ask } from "../core/dialogs.js";
 import { attempt } from "../core/messages.js";
-import { open, operates, plant, plantRuns } from "../core/actions.js";
+import { modelOf, open, operates, plant, plantRuns } from "../core/actions.js";
 import { words } from "../core/format.js";
 import { faults, guess } from "./plant_running.js";
 import { hiddenEffects } from "./hidden_effects.js";
 
-const chosen = { model: null, hidden: {}, bus: null, canModel: null, realBus: null, lockstep: true };
+const chosen = { model: null, hidden: {}, bus: null, canModel: null, realBus: null, channel: null, lockstep: true };
 
 async function load() {
   if (state.choices || state.asksForChoices) return;
@@ -60,6 +60,8 @@ function guessCard(first) {
   return html`<section class="card choice ${first ? "first" : ""}">
     <h2>Guess what is wrong</h2>
     <p>A simulator that hides one effect its model file does not have. Find it with the tools of this page. A good first round.</p>
+    <ol class="loop small"><li>Start it and enable it.</li><li>Run the experiment <em>first_look</em>.</li>
+      <li>Diagnose the record, add what is missing.</li><li>Answer what was hidden.</li></ol>
     <button class=${first ? "primary" : ""} id="start-guess" ?disabled=${!operates()} @click=${() => start({ kind: "guess" })}>Start with a hidden effect</button>
   </section>`;
 }
@@ -97,15 +99,18 @@ function virtualCard({ buses: all, models }) {
 
 function realCard({ buses }) {
   const bus = buses.find((one) => one.name === chosen.realBus) ?? buses[0];
+  const channel = chosen.channel ?? bus?.channel ?? "";
   return html`<section class="card choice">
     <h2>Real bench</h2>
     <p>The CAN driver on an interface of this machine. It starts disabled, after a question.</p>
     ${buses.length
-      ? html`<label class="field">Bus file <select @change=${(event) => { chosen.realBus = event.target.value; changed(); }}>
-          ${buses.map((one) => html`<option value=${one.name} ?selected=${one === bus}>${one.name} · ${one.interface} ${one.channel}</option>`)}
-        </select></label>`
+      ? html`<label class="field">Bus file <select id="real-bus" @change=${(event) => { Object.assign(chosen, { realBus: event.target.value, channel: null }); changed(); }}>
+          ${buses.map((one) => html`<option value=${one.name} ?selected=${one === bus}>${one.name}</option>`)}
+        </select></label>
+        <label class="field">Channel of ${bus.interface} <input type="text" id="real-channel" spellcheck="false" .value=${live(channel)}
+          @input=${(event) => { chosen.channel = event.target.value; changed(); }}></label>`
       : html`<p class="soft">There is no bus file of a real bench.</p>`}
-    <button id="start-real" ?disabled=${!operates() || !bus} @click=${() => startReal(bus)}>Connect…</button>
+    <button id="start-real" ?disabled=${!operates() || !bus || !channel.trim()} @click=${() => startReal({ ...bus, channel: channel.trim() })}>Connect…</button>
   </section>`;
 }
 
@@ -116,8 +121,7 @@ function runningCard() {
       <button id="stop-plant" ?disabled=${!operates()} @click=${stopPlant}>Shut down</button></header>
     <p>${now.text}</p>
     <dl class="facts">
-      <dt>Model file</dt><dd>${now.model ?? "–"}</dd>
-      <dt>Lifecycle</dt><dd>${now.lifecycle ?? "–"}</dd>
+      <dt>Model file</dt><dd>${modelOf(now.model)?.name ?? "–"}</dd>
       <dt>Commanded by</dt><dd>${now.source || "nobody"}</dd>
     </dl>
     ${guess()}

@@ -11,7 +11,7 @@ import { diagnoseRecord } from "./diagnosis_steps.js";
 import { importer, take, takeFiles } from "./importer.js";
 import { overlayView } from "./overlay.js";
 
-Object.assign(state, { shownRecords: [], overlayModel: "" });
+Object.assign(state, { shownRecords: [], overlayModels: ["", ""] });
 let over = 0;
 
 const SOURCES = { experiment: "measured here", imported: "brought", opened: "opened" };
@@ -67,7 +67,7 @@ function drop() {
 export function recordsView() {
   return html`
     <div class="title"><div><h1>Records</h1>
-      <p>Bags of experiments arrive here by themselves. Tick two to lay them over each other, or one and a model.</p></div></div>
+      <p>Bags of experiments arrive here by themselves. Tick one or two to see them over each other; models can join them.</p></div></div>
     <div class="stack">
       ${state.importing ? importer() : drop()}
       <section class="card flush" aria-label="List of records">
