@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,9 @@ from typing import Any
 import pytest
 
 PATIENCE_MS = 300_000  # a diagnosis on a slow machine that runs other tests beside
+thorough = pytest.mark.skipif(
+    "BENCH_BROWSER" not in os.environ, reason="minutes beside a bench by the wall clock: BENCH_BROWSER=1 runs it"
+)
 
 
 def until(page: Any, condition: str, argument: Any = None) -> Any:
