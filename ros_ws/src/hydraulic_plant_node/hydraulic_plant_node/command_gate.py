@@ -156,7 +156,7 @@ class CommandGate:
         if verdict.obeyed or verdict is Verdict.STALE and self.enabled and self._source in ("", command.source):
             self._answered_ns = command.stamp_ns, self._answered_ns[0]
         if verdict is not Verdict.ACCEPTED:
-            self.last_problem = f"{verdict.value} (source {command.source!r}, {command.drive} V)"
+            self.last_problem = f"{verdict.value} (source {command.source!r}, {command.drive:.4g} V)"
         return verdict
 
     def reject(self, reason: str) -> Verdict:
