@@ -131,6 +131,8 @@ class Plant:
 
         :raises ModelError: an unknown key.
         """
+        if not values:
+            return self
         other = copy.copy(self)
         other._parameters = self._parameters.copy()
         for key, value in values.items():

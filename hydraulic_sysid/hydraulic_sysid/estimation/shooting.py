@@ -173,7 +173,7 @@ class Shooting:
         return list(_workers(processors.usable()).map(function, items))
 
     def _residual(self, plant: Plant, i: int, states: Array, inner: Inner | None = None) -> Array:
-        segments, plant = self.segments[i], self._beside(plant, i)
+        segments = self.segments[i]
         run = self._run(plant, i, states, inner)
         off = (self.initial_states[i] - states)[:, segments.free] / segments.prior_std
         if segments.tracked:
@@ -191,10 +191,10 @@ class Shooting:
     def _run(
         self, plant: Plant, i: int, states: Array, inner: Inner | None = None, drive: Array | None = None
     ) -> Array:
-        segments, plant = self.segments[i], self._beside(plant, i)
+        segments = self.segments[i]
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.record["drive"] if drive is None else drive
-        run = plant.predict(
+        run = self._beside(plant, i).predict(
             drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, segments.turning
         )
         return np.stack([run[c] for c in segments.channels], axis=-1)
@@ -226,8 +226,7 @@ class Shooting:
 
     def _beside(self, plant: Plant, i: int) -> Plant:
         """The plant with what record ``i`` states of the machine."""
-        settings = self.segments[i].record.settings
-        return plant.with_parameters(settings) if settings else plant
+        return plant.with_parameters(self.segments[i].record.settings)
 
     def _projection(self, plant: Plant, i: int, states: Array) -> Projection:
         segments, inner = self.segments[i], self._inner(plant, i)

@@ -60,8 +60,7 @@ class ModelSubject:
 
     def runs(self, data: Measured) -> PlantRuns:
         """The plant, and its states in the free run."""
-        settings = data.record.settings
-        return PlantRuns(self.plant.with_parameters(settings) if settings else self.plant, data)
+        return PlantRuns(self.plant.with_parameters(data.record.settings), data)
 
     def document(self) -> dict[str, Any]:
         """See `model_document`."""

@@ -62,8 +62,7 @@ def record_balances(
     balances: Balances, record: Record, names: tuple[str, ...], keys: Sequence[str], seed: int
 ) -> RecordBalances:
     """Form ``names`` of a record; ``keys`` are the parameters that may move. ``seed`` draws the reference's noise."""
-    if record.settings:
-        balances = balances.with_parameters(record.settings)
+    balances = balances.with_parameters(record.settings)
     plant, drive, dt = balances.plant, record["drive"], record.dt
     data, factor = measured(record, Scales.of(balances.model)), decimation_factor(record.dt)
     filter_ = data.velocity_filter

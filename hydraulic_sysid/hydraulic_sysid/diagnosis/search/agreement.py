@@ -25,10 +25,10 @@ def agreed(before: Sequence[Array], after: Sequence[Array], fit: Sequence[Mask])
     :param after: the same of the other model
     :param fit: (S,) which segments were fitted, per record
     """
-    parts = [f for f in (np.concatenate(list(fit)), ~np.concatenate(list(fit))) if f.any()]
+    fitted = np.concatenate(list(fit))
     own, size = _in_segments(before, after)
-    found = [agreement(own[part], size[part]) for part in parts]
-    return all(f > least for f, least in zip(found, (AGREED, CONFIRMED), strict=False))
+    confirmed = fitted.all() or agreement(own[~fitted], size[~fitted]) > CONFIRMED
+    return bool(agreement(own[fitted], size[fitted]) > AGREED and confirmed)
 
 
 def agreement(own: Array, size: Array) -> float:

@@ -116,10 +116,8 @@ class Linearisation:
     def _subset(self, chosen: Sequence[Mask]) -> Linearisation:
         point = self.point.subset(chosen)
         split = Split(list(point.shooting.segments), [np.ones(len(s), dtype=bool) for s in point.shooting.segments])
-        known = vars(self).get("beyond", self.known)  # not taken of all segments for the sake of a few
-        if known is not None:
-            known = [b[c] for b, c in zip(known, chosen, strict=True) if c.any()]
-        return Linearisation(self.model, split, point, known)
+        beyond = [b[c] for b, c in zip(self.beyond, chosen, strict=True) if c.any()]
+        return Linearisation(self.model, split, point, beyond)
 
     def _inner(self, left: Sequence[Array], right: Sequence[Array]) -> Array:
         """Σ over the segments for fitting of left·right: (S, m, P), (S, m, Q) → (P, Q)."""

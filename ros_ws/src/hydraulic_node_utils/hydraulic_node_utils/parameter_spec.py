@@ -29,6 +29,11 @@ class ParameterSpec:
     live: bool = False
     choices: tuple[str, ...] = ()
 
+    @property
+    def whole(self) -> bool:
+        """Whether it is a whole number."""
+        return type(self.default) is int
+
     def check(self, value: Any) -> Any:
         """`value` in the parameter's type.
 

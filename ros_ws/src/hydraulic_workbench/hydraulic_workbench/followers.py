@@ -157,7 +157,7 @@ PATIENT: dict[str, object] = {"lockstep": True, "use_sim_time": True, "age_limit
 """Of a controller whose plant waits for it."""
 
 
-WHOLE = frozenset(p.name for p in PARAMETERS if type(p.default) is int)
+WHOLE = frozenset(p.name for p in PARAMETERS if p.whole)
 """Parameters of the reference that are whole numbers."""
 
 

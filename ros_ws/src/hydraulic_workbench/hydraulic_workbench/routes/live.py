@@ -82,7 +82,7 @@ def references() -> list[dict[str, Any]]:
         parameters: list[Any] = [
             {"name": s.name, "value": s.default, "unit": s.unit, "minimum": s.minimum, "maximum": s.maximum,
              "description": s.description, "live": s.live, "display": display(s.unit), "choices": None,
-             "whole": type(s.default) is int}
+             "whole": s.whole}
             for s in numbers
             if s.name in own
         ]  # fmt: skip
