@@ -596,12 +596,12 @@ class Search:
         if not decisive(found).added:
             return found
         before = self.split
-        self.judged(self.state(found.final.model, self._last))
+        again = self.judged(self.state(found.final.model, self._last))
         if not quieter(before, self.split) and not retimed(before, self.split):
             self.split = before
             return found
         self.say("searching on: what was taken for noise or small delays was partly what is missing")
-        return self.onward(found.base, found.base.model, self.state(found.final.model, self._last))
+        return self.onward(found.base, found.base.model, again)
 
     def onward(self, base: SearchState, model: Model, known: SearchState) -> SearchResult:
         """The search from what is ``known`` on, its ``base`` and what was tried there fitted anew to ``model``."""
@@ -730,7 +730,7 @@ class Search:
             own = [p.name for p in model.library[name].parameters]
             model = model.with_effect(name, {p: final.model.value(f"{name}.{p}") for p in own})
             try:
-                found[name] = self.state(model).misfit
+                found[name] = self.state(model, self._last).misfit
             except SimulationError:  # with the values that it has beside the others
                 found[name] = next(reversed(found.values()), base.misfit)
         return {**found, **{name: final.misfit for name in order[-1:]}}

@@ -117,6 +117,7 @@ def run_verb(package: str, argv: Sequence[str] | None = None) -> int:
     """``python -m PACKAGE VERB …``: hand over to the verb; its exit code. Without one, list them."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     name, known = arguments[0] if arguments else "", verbs(package)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by numpy; matrices are small, more threads only spin
     if name in known:
         return int(importlib.import_module(f"{package}.verbs.{name}").main(arguments[1:]))
     if name not in ("", "-h", "--help"):
