@@ -320,7 +320,19 @@ class Search:
         strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
         done, moved = self.fewest_moved(final, strict if final is base else None)
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
-            moved = [replace(d, instead=self.instead(strict, done, d, moved)) for d in moved]
+            places = [self.in_place_of(strict, done, d, moved) for d in moved]
+            best = min((s for _, states in places for s in states), key=lambda s: s.misfit.total, default=done)
+            if self.better(done, best):
+                place = next(i for i, (_, states) in enumerate(places) if any(s is best for s in states))
+                name, without = _new(best, strict), places[place][0]
+                return replace(
+                    found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without},
+                    moved=tuple(d for i, d in enumerate(moved) if i != place),
+                )  # fmt: skip
+            moved = [
+                replace(d, instead=tuple(_new(s, strict) for s in states))
+                for d, (_, states) in zip(moved, places, strict=True)
+            ]
         misfits = found.misfits
         if misfits:
             misfits = {**misfits, next(reversed(misfits)): done.misfit}
@@ -398,25 +410,25 @@ class Search:
             return None
         return None if _worse(tried.state.misfit, found.final.misfit) else tried
 
-    def instead(
+    def in_place_of(
         self, strict: SearchState, done: SearchState, deviation: Deviation, moved: Sequence[Deviation]
-    ) -> tuple[str, ...]:
-        """Effects that explain what another value of a number does, as far as these records can say.
+    ) -> tuple[SearchState, list[SearchState]]:
+        """The state without another value of a number, and with effects that explain no less than it does.
 
         ``strict``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
         """
         others = [d.key for d in moved if d.key != deviation.key]
-        without = self.with_moved(done, others) if others else strict
+        without = self.explore(self.with_moved(done, others) if others else strict, LATER_REFITS)
         promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
         found = []
-        for r in [r for r in self.explore(without, LATER_REFITS).refits if r.misfit.total < promising][:FULL]:
+        for r in [r for r in without.refits if r.misfit.total < promising][:FULL]:
             try:
-                reached = self.state(r.refit.model, self._last).misfit
+                reached = self.state(r.refit.model, self._last)
             except SimulationError:
                 continue
-            if not _worse(reached, done.misfit):
-                found.append(r.name)
-        return tuple(found)
+            if not _worse(reached.misfit, done.misfit):
+                found.append(reached)
+        return without, found
 
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
@@ -595,13 +607,18 @@ class Search:
         found = self.forward(self.recorded(self.begin()))
         if not decisive(found).added:
             return found
+        again = self.judged_anew(self.state(found.final.model, self._last))
+        return found if again is None else self.onward(found.base, found.base.model, again)
+
+    def judged_anew(self, state: SearchState) -> SearchState | None:
+        """A state judged by the noise and the delays that it shows; None where they are those it was judged by."""
         before = self.split
-        again = self.judged(self.state(found.final.model, self._last))
+        again = self.judged(state)
         if not quieter(before, self.split) and not retimed(before, self.split):
             self.split = before
-            return found
+            return None
         self.say("searching on: what was taken for noise or small delays was partly what is missing")
-        return self.onward(found.base, found.base.model, again)
+        return again
 
     def onward(self, base: SearchState, model: Model, known: SearchState) -> SearchResult:
         """The search from what is ``known`` on, its ``base`` and what was tried there fitted anew to ``model``."""
@@ -643,6 +660,10 @@ class Search:
             self.say.reached(added, better.misfit)
             nothing = better.misfit.variance - 1.0 < NOTHING_LEFT
             last = len(added) == MOST_EFFECTS and explained(base.misfit, better.misfit) > MOSTLY
+            # What was judged by a model that lacked it would ask for further effects.
+            again = None if nothing or last or better.misfit.variance >= FAR_OFF else self.judged_anew(better)
+            if again is not None:
+                return self.onward(base, base.model, again)
             path.append(better if nothing or last else self.explore(better, most=LATER_REFITS))
             if nothing:
                 break
