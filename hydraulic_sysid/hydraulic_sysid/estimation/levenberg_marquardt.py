@@ -110,7 +110,7 @@ def minimise(
         better: P | None = None
         while better is None and damping <= _MOST_DAMPING:
             change = bounded_step(normal, point.parameters, damping)
-            if normal.reduction(change) < least_gain * point.cost:
+            if tolerance and normal.reduction(change) < least_gain * point.cost:
                 return Minimum(point, True, number)
             tried = point.moved(change)
             if tried is not None and tried.cost < point.cost:

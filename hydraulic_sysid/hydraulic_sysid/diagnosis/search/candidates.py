@@ -21,7 +21,9 @@ SHAPES = (1.0, 0.3, 3.0, 8.0)  # of the default
 SIZES = (1.0, 0.25)  # of the default, measured from the null value
 LARGE = (10.0,)  # where those change nothing, …
 SMALL = (0.1, 0.02)  # … and where the plant is too small for them
-MOST_SHAPES = 7
+MOST_SHAPES = 24
+FREQUENCIES = (1.0, 0.5, 0.25, 2.0, 4.0)  # of the default at which a resonance is looked for, …
+WIDE = 8.0  # … so many times as much damped: that of a light damping shows at its own frequency alone
 ANGLE = "rad"
 WITHIN = 0.4  # of the stroke: lengths that are tried are no longer
 QUARTERS = tuple(0.5 * math.pi * i for i in range(4))  # angles that are tried
@@ -98,7 +100,8 @@ def probes(effect: Effect, features: RecordFeatures, sizes: Sequence[float] = SI
     moved = [p for p in effect.parameters if p.null is not None and p.free]
     grids = [_grid(p, features) for p in shape]
     first = tuple(g[0] for g in grids)
-    tried = [first] + [c for c in itertools.product(*grids) if c != first and _changes(c, first) == 1]
+    single = [c for c in itertools.product(*grids) if c != first and _changes(c, first) == 1]
+    tried = list(dict.fromkeys([first, *_resonances(shape, grids), *single]))
     # An angle says nothing without the right frequency, nor the other way round: all of one with all of the other.
     for values, turned in itertools.product(
         tried[: MOST_SHAPES + len(features.lines)], itertools.product(QUARTERS, repeat=len(angles))
@@ -118,6 +121,19 @@ def between(null: float, value: float, share: float, default: float) -> float:
     if inverse(null, default):
         return min(value / share, null) if share > 0.0 else null
     return (1.0 - share) * null + share * value  # exactly the value at 1: it may be a bound
+
+
+def _resonances(shape: Sequence[Parameter], grids: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
+    """Shapes at whose frequency and damping a resonance is looked for, with all values of what else they have."""
+    names = [p.name for p in shape]
+    if "damping" not in names or not any(p.unit == "Hz" for p in shape):
+        return []
+    every = []
+    for p, grid in zip(shape, grids, strict=True):
+        times = FREQUENCIES if p.unit == "Hz" else (WIDE,) if p.name == "damping" else ()
+        low, high = p.bounds
+        every.append([min(max(t * p.default, low), high) for t in times] or grid)
+    return list(itertools.product(*every))
 
 
 def _changes(one: tuple[float, ...], other: tuple[float, ...]) -> int:

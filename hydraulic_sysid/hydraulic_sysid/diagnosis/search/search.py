@@ -81,6 +81,7 @@ MOST_EFFECTS = 3
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
 SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
+BEYOND = 6  # values of a number at its bound, from there to how far it may go, from which a fit may begin
 SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one
 CLEAR = 10.0  # times what names a number, beyond which a fit need not show what putting it back costs
 QUIETER = 0.95  # of the noise before: what was judged by that is judged again
@@ -173,7 +174,8 @@ class Search:
         # What lies at its bound may be far beyond it.
         far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
         try:
-            loose = self.nearer(relaxed(strict.model), far)
+            model = self.begun_beyond(relaxed(strict.model), [k for k in stretched(self.given) if k in at_bound])
+            loose = self.nearer(model, far)
         except SimulationError:  # it went where the plant does not run
             return None
         helps = self.better(strict, loose) and explained(strict.misfit, loose.misfit) > FURTHER
@@ -200,6 +202,28 @@ class Search:
             short = found
         found = min(found, short, key=lambda s: s.misfit.total)
         return self.state(found.model, self._last) if found.misfit.variance < FAR_OFF else found
+
+    def begun_beyond(self, model: Model, keys: Sequence[str]) -> Model:
+        """The model, each number that lay at its bound where it leaves short segments least on the way to its new one.
+
+        Between a wrong resonance and the right one there is no way downhill.
+        """
+        if not keys:
+            return model
+        smooth, short = self._smooth(model), self.short().some(ENOUGH)
+        for key in keys:
+            now = smooth.value(key)
+            low, high = smooth.entry(key).bounds or (now, now)
+            end = high if now > self.given.value(key) else low
+            costs = {}
+            for value in np.linspace(now, end, BEYOND).tolist():
+                try:
+                    plant = Plant.for_fits(smooth.with_values({key: value}))
+                    costs[value] = FitPoint.begin(plant, short, smooth.movable_keys(), priors=self.priors).cost
+                except SimulationError:
+                    continue
+            smooth = smooth.with_values({key: min(costs, key=lambda v: costs[v], default=now)})
+        return model.with_values({key: smooth.value(key) for key in keys})
 
     def fitted_to_short_segments(self, model: Model) -> Model:
         """The model with what a first fit to segments a quarter as long gives."""
