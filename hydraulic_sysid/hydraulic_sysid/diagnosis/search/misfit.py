@@ -128,8 +128,6 @@ def material(before: Misfit, after: Misfit) -> bool:
     It must be so without the few segments that gain most and those that lose most, too.
     """
     gain, fit, validation = before.total - after.total, before.fit - after.fit, before.validation - after.validation
-    if gain <= 0.0:
-        return False
     if _comparable(before, after):
         gains = before.by_segment - after.by_segment
         few = _few(gains)

@@ -27,6 +27,8 @@ ENOUGH = 50  # segments that do for a look
 MOST = 64.0  # sampling intervals by which a channel may be late, or per cent by which its gain may be off
 TRIED = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of these, from which the best size is searched
 PER_CENT = 0.01
+FILTERED = 0.95  # sampling intervals, or per cent: by less a sound transducer with its filter is late, too …
+ORDER = 0.6  # … and what only another order of conversion would make early
 PRESSURES = ("pressure_a", "pressure_b")
 
 
@@ -120,7 +122,10 @@ class RecordingFault:
 
     def unusual(self, dt: float) -> bool:
         """Whether it is larger than what sound transducers and loggers with this sampling interval [s] do, too."""
-        return isinstance(self.hypothesis, DriveHypothesis) or abs(self.size) >= self.hypothesis.step(dt)
+        if isinstance(self.hypothesis, DriveHypothesis):
+            return True
+        usual = ORDER if 1 not in self.hypothesis.ways else FILTERED
+        return abs(self.size) >= usual * self.hypothesis.step(dt)
 
     @property
     def unit(self) -> str:

@@ -101,7 +101,7 @@ def anything(name: str, after: Misfit, part: float) -> bool:
 
 def leaves_most(before: Misfit, after: Misfit) -> bool:
     """Whether so little was left before that nothing need be missing, and much of that still is."""
-    return before.little and after.variance - 1.0 > max(SMALL_UNEXPLAINED * (before.variance - 1.0), NOTHING_LEFT)
+    return before.little and after.usual - 1.0 > max(SMALL_UNEXPLAINED * (before.variance - 1.0), NOTHING_LEFT)
 
 
 def nothing_gained(before: Misfit, after: Misfit) -> bool:
