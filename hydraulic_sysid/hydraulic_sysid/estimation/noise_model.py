@@ -192,10 +192,11 @@ def _capped(spectrum: Array, dt: float, order: int) -> Array:
 def outliers(residuals: Array, noise: ChannelNoise) -> Mask:
     """(S, n) which samples stand alone, far off the noise: spikes of a converter or a cable, not a model's error.
 
-    A model's error lasts; a spike does not, so that it stands out from the residuals beside it as well.
+    A model's error lasts; a spike does not, so that it stands out from the residuals beside it, wherever these are.
     """
-    around = median_filter(np.abs(residuals), size=(1, 9))
-    return np.abs(residuals) > OUTLIER * np.maximum(noise.std, 3.0 * around)
+    off = np.abs(residuals - median_filter(residuals, size=(1, 9)))
+    around = median_filter(off, size=(1, 9))
+    return off > OUTLIER * np.maximum(noise.std, 3.0 * around)
 
 
 def mains_lines(residual: Array, dt: float) -> tuple[float, ...]:
