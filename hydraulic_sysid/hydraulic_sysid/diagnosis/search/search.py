@@ -249,21 +249,22 @@ class Search:
 
     def recorded(self, base: SearchState) -> SearchState:
         """A state with its candidates explored, and with every fault of the recording that explains more than they."""
-        while not self.nothing_left(base):
+        for tried in range(MOST_FAULTS + 1):
+            if self.nothing_left(base):
+                break
             self.path = [base]
             base = self.explore(base)
             left = remainders(self.split, base.residual)
-            if len(self.faults) == MOST_FAULTS:
+            if tried == MOST_FAULTS:
                 break
             self.say("faults of the recording")
             # A disturbance is free enough to take up what laws leave, the reading of a channel is not.
             disturbances = not negligible(left, UNNOTICED) and not immaterial(base.misfit, left)
             faults = recording_faults(base.linearisation, disturbances)
-            if base.misfit.little:  # filters of sound transducers delay by a part of a sampling interval, too
-                faults = [f for f in faults if f.unusual(self.split.interval)]
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             enough = RIVAL * (base.misfit.fit - best)
-            self.rivals = [f for f in faults if not f.linear and f.reduction >= enough][:FULL]
+            named = [f for f in faults if not base.misfit.little or f.unusual(self.split.interval)]
+            self.rivals = [f for f in named if not f.linear and f.reduction >= enough][:FULL]
             if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
                 break
             # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
@@ -274,8 +275,10 @@ class Search:
                 break
             if leaves_most(base.misfit, found.misfit):
                 break
-            self.as_recorded = self.as_recorded or base
-            self.faults = together(self.faults, found.fault)
+            # Filters of sound transducers delay by a part of a sampling interval, too: that is known, but not named.
+            if not base.misfit.little or found.fault.unusual(self.split.interval):
+                self.as_recorded = self.as_recorded or base
+                self.faults = together(self.faults, found.fault)
             self.split, self.path = found.split, [found.state]
             base = self.loosened(self.judged(found.state))
         return base if base.scores else self.rounded(base)
