@@ -98,8 +98,8 @@ def minimise(
 ) -> Minimum[P]:
     """The minimum near ``point``.
 
-    It is found when a step lowers the cost by less than ``least_gain`` of it, or promises no more, or when the next step
-    would be shorter than ``tolerance`` standard errors. ``accepted`` sees every step and may hand back another point (whose residuals
+    It is found when a step lowers the cost by less than ``least_gain`` of it, or when the next step would be shorter
+    than ``tolerance`` standard errors. ``accepted`` sees every step and may hand back another point (whose residuals
     are weighed otherwise) to go on from.
     """
     damping = _FIRST_DAMPING
@@ -109,10 +109,7 @@ def minimise(
             return Minimum(point, False, number - 1)
         better: P | None = None
         while better is None and damping <= _MOST_DAMPING:
-            change = bounded_step(normal, point.parameters, damping)
-            if tolerance and normal.reduction(change) < least_gain * point.cost:
-                return Minimum(point, True, number)
-            tried = point.moved(change)
+            tried = point.moved(bounded_step(normal, point.parameters, damping))
             if tried is not None and tried.cost < point.cost:
                 better = tried  # type: ignore[assignment]
             else:

@@ -34,6 +34,8 @@ LOADING = 1e-5  # of the variance, added as a white part: no noise is without on
 QUIET = 0.2  # quantile of the segments' mean squares from which the noise is judged
 WITHIN = 3.5  # standard deviations of a mean square above which a segment holds more than noise
 OUTLIER = 6.0  # innovations' standard deviations
+JUMP = 0.5  # of what a spike is off the residuals beside it, by which it is off the readings beside it
+SPIKY = 1e-3  # share of samples of a channel that stand alone by themselves: it is known to have spikes
 MAINS = (50.0, 60.0)  # Hz
 HARMONICS = (1, 2, 3, 5)
 UNSTEADY = 0.25  # spread of the logarithm of the power between segments, beyond chance, from which noise is not steady
@@ -192,11 +194,22 @@ def _capped(spectrum: Array, dt: float, order: int) -> Array:
 def outliers(residuals: Array, noise: ChannelNoise) -> Mask:
     """(S, n) which samples stand alone, far off the noise: spikes of a converter or a cable, not a model's error.
 
-    A model's error lasts; a spike does not, so that it stands out from the residuals beside it, wherever these are.
+    A model's error lasts; a spike does not, so that it stands out from the residuals beside it as well.
+    """
+    around = median_filter(np.abs(residuals), size=(1, 9))
+    return np.abs(residuals) > OUTLIER * np.maximum(noise.std, 3.0 * around)
+
+
+def jumps(residuals: Array, noise: ChannelNoise, readings: Array) -> Mask:
+    """(S, n) which samples stand out from the residuals beside them, however far off these are, and in the readings.
+
+    For channels that are known to have spikes: where a model is far off, what is no spike may look alike.
     """
     off = np.abs(residuals - median_filter(residuals, size=(1, 9)))
-    around = median_filter(off, size=(1, 9))
-    return off > OUTLIER * np.maximum(noise.std, 3.0 * around)
+    padded = np.pad(readings, ((0, 0), (2, 2)), mode="reflect", reflect_type="odd")
+    beside = np.median([padded[:, k : k + readings.shape[1]] for k in (0, 1, 3, 4)], axis=0)
+    far = off > OUTLIER * np.maximum(noise.std, 3.0 * median_filter(off, size=(1, 9)))
+    return np.asarray(far & (np.abs(readings - beside) > JUMP * off))
 
 
 def mains_lines(residual: Array, dt: float) -> tuple[float, ...]:

@@ -117,9 +117,12 @@ def _spikes(point: FitPoint, left: Sequence[Array], channels: Sequence[str]) -> 
     for channel in channels:
         where = [(i, s.channels.index(channel)) for i, s in enumerate(segments) if channel in s.channels]
         first = noise_model.estimate([left[i][:, :, c] for i, c in where], segments[where[0][0]].record.dt)
+        spiky = np.mean(np.concatenate([found[i][:, :, c].ravel() for i, c in where])) > noise_model.SPIKY
         for i, c in where:
             found[i][:, :, c] &= deviations[i][:, :, c] > noise_model.OUTLIER * first.std
             found[i][:, :, c] |= noise_model.outliers(left[i][:, :, c], first)
+            if spiky:
+                found[i][:, :, c] |= noise_model.jumps(left[i][:, :, c], first, segments[i].measured[:, :, c])
     return found
 
 
