@@ -100,6 +100,29 @@ def test_lines_are_tried_where_a_shape_is_a_frequency(model) -> None:
     assert 33.0 not in {p.values["pump_ripple.frequency"] for g in probes(ripple, RecordFeatures()) for p in g}
 
 
+def test_a_resonance_is_looked_for_much_damped_at_several_frequencies(model) -> None:
+    for name, gaps in (("structural_flexibility", 1), ("backlash", 4)):
+        effect = model.library[name]
+        given = {p.name: p.default for p in effect.parameters}
+        tried = [g[0].values for g in probes(effect, RecordFeatures())]
+        wide = [v for v in tried if v[f"{name}.damping"] == pytest.approx(8.0 * given["damping"])]
+        shares = {round(v[f"{name}.frequency"] / given["frequency"], 9) for v in wide}
+        assert {0.25, 0.5, 1.0, 2.0, 4.0} <= shares
+        assert len({v.get(f"{name}.gap") for v in wide}) == gaps
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "unusual"),
+    [
+        ("position", -0.7e-3, True), ("position", -0.5e-3, False), ("drive", -1e-3, True),
+        ("pressures", 0.7e-3, False), ("pressures", 1e-3, True), ("pressure_a_gain", 0.02, True),
+    ],
+)  # fmt: skip
+def test_what_no_filter_makes_early_is_a_fault_sooner(name: str, size: float, unusual: bool) -> None:
+    hypothesis = next(h for h in HYPOTHESES if h.name == name)
+    assert RecordingFault(hypothesis, size, 1e-5, 100.0).unusual(1e-3) is unusual
+
+
 @pytest.mark.parametrize("stroke", [0.1, 0.6, 1.5])
 def test_lengths_are_tried_within_the_stroke(model, stroke: float) -> None:
     """Cushions that meet in the middle differ in nothing but their strength: from there no fit finds shorter ones."""
@@ -436,6 +459,8 @@ def test_no_single_segment_turns_what_counts() -> None:
     worse = [5000.0 if i == wild else c for i, c in enumerate(after)]
     start = by_segment([4000.0 if i == wild else c for i, c in enumerate(before)])
     assert material(start, by_segment(worse)) and explained(start, by_segment(worse)) == pytest.approx(1.0)
+    lost = [20_000.0 if i == wild else c for i, c in enumerate(after)]  # more than all others gain
+    assert material(by_segment(before), by_segment(lost))
     alone = by_segment([1000.0 if i == wild else c for i, c in enumerate(before)])
     assert not material(start, alone)  # one segment that gains is no effect either
 

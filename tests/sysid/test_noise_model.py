@@ -134,6 +134,19 @@ def test_outliers_stand_alone_and_errors_of_a_model_do_not() -> None:
     assert not noise_model.outliers(values + error, ChannelNoise.white(1.0)).any()
 
 
+def test_spikes_upon_an_error_of_a_model_are_found_in_the_readings() -> None:
+    draw, time = np.random.default_rng(8), np.arange(SAMPLES)
+    motion = 400.0 * np.sin(0.02 * time)
+    error = 60.0 * np.sin(0.03 * time) + draw.standard_normal((SEGMENTS, SAMPLES))
+    spoiled = draw.random(error.shape) < 2e-3
+    spoiled[:, :2] = spoiled[:, -2:] = False
+    left, white = error + 100.0 * spoiled, ChannelNoise.white(1.0)
+    assert noise_model.outliers(left, white)[spoiled].mean() < 0.5
+    assert noise_model.jumps(left, white, motion + left)[spoiled].mean() > 0.95
+    assert not noise_model.jumps(left, white, motion + error).any(), "the readings say nothing of it"
+    assert not noise_model.jumps(error, white, motion + error).any()
+
+
 def test_spikes_are_found_and_peaks_of_pressure_are_not() -> None:
     draw, time = np.random.default_rng(6), DT * np.arange(8000)
     pressure = 5e6 + 2e6 * np.tanh((np.mod(time, 1.0) - 0.5) / 4e-3) + 8e3 * draw.standard_normal(time.size)

@@ -22,11 +22,13 @@ def model() -> Model:
     return load_model("sample_bench")
 
 
-def search(model: Model, plant: Model) -> Search:
-    """On a record of ``plant``: slow sines with noise of 3 µm and 2 kPa."""
+def search(model: Model, plant: Model, steps: bool = False) -> Search:
+    """On a record of ``plant``: slow sines or steps, with noise of 3 µm and 2 kPa."""
     rng = np.random.default_rng(11)
     t = DT * np.arange(round(SECONDS / DT))
     drive = 1.2 * np.sin(2.0 * np.pi * 0.4 * t) + 0.8 * np.sin(2.0 * np.pi * 1.3 * t)
+    if steps:
+        drive = np.repeat(rng.uniform(-4.0, 4.0, t.size // 300), 300)
     run = Plant(plant).simulate(drive, DT)
     noise = {"position": 3e-6, "pressure_a": 2e3, "pressure_b": 2e3}
     channels = {c: np.asarray(getattr(run, c)) + rng.normal(0.0, s, t.size) for c, s in noise.items()}
@@ -42,3 +44,13 @@ def test_what_passes_for_noise_is_still_promised_by_its_effect(model: Model, hid
     base = looked.judged(looked.state(looked.given))
     assert base.misfit.variance - 1.0 < NOTHING_LEFT, "by the noise alone nothing is left of either"
     assert looked.nothing_left(base) is nothing
+
+
+def test_a_load_that_the_file_does_not_know_is_found_beyond_its_bound(model: Model) -> None:
+    """From the bound on every step is uphill: a resonance that is a little off is as wrong as one that is far off."""
+    heavy = 1.85 * model.value("moving_mass")
+    looked = search(model, model.with_values({"moving_mass": heavy}), steps=True)
+    assert model.entry("moving_mass").bounds[1] < 0.7 * heavy
+    base = looked.begin()
+    assert base.model.value("moving_mass") == pytest.approx(heavy, rel=0.03)
+    assert base.misfit.little

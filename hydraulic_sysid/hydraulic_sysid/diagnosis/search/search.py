@@ -81,7 +81,7 @@ MOST_EFFECTS = 3
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
 SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
-BEYOND = 6  # values of a number at its bound, from there to how far it may go, from which a fit may begin
+BEYOND = 8  # values of a number that lay at its bound, over all where it may go, from which a fit may begin
 SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one
 CLEAR = 10.0  # times what names a number, beyond which a fit need not show what putting it back costs
 QUIETER = 0.95  # of the noise before: what was judged by that is judged again
@@ -204,7 +204,7 @@ class Search:
         return self.state(found.model, self._last) if found.misfit.variance < FAR_OFF else found
 
     def begun_beyond(self, model: Model, keys: Sequence[str]) -> Model:
-        """The model, each number that lay at its bound where it leaves short segments least on the way to its new one.
+        """The model, each number that lay at its bound where it leaves short segments least, wherever it may go.
 
         Between a wrong resonance and the right one there is no way downhill.
         """
@@ -214,9 +214,8 @@ class Search:
         for key in keys:
             now = smooth.value(key)
             low, high = smooth.entry(key).bounds or (now, now)
-            end = high if now > self.given.value(key) else low
             costs = {}
-            for value in np.linspace(now, end, BEYOND).tolist():
+            for value in [now, *np.linspace(low, high, BEYOND).tolist()]:
                 try:
                     plant = Plant.for_fits(smooth.with_values({key: value}))
                     costs[value] = FitPoint.begin(plant, short, smooth.movable_keys(), priors=self.priors).cost
