@@ -38,6 +38,7 @@ NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
 VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
+UNATTRIBUTED = 0.1  # of what is left: a curve that explains less of it shows no law that is missing
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
 BELOW = 0.9  # residual over noise below which the noise model is doubted
@@ -87,6 +88,21 @@ def judge(result: SearchResult) -> Verdict:
     rivals = any(not c.distinguishable for every in competing.values() for c in every)
     tied = rivals or bool(family) or bool(result.faults_instead)
     return Verdict(kind_of(result, tied), result.added, competing, family)
+
+
+def reviewed(verdict: Verdict, result: SearchResult, curves: Sequence[NonparametricCurve]) -> Verdict:
+    """The verdict once it is known what ``curves`` explain of what is left.
+
+    Where effects explain the most and no curve at any place a part of the rest, that is how far their laws are off
+    those of the bench (the touch of a backlash, the start of a cushion): nothing else is missing.
+    """
+    if verdict.kind != OUTSIDE or not result.added or strained(result):
+        return verdict
+    share = unexplained_share(result.base.misfit, result.final.misfit)
+    if share > SMALL_UNEXPLAINED or any(c.share >= UNATTRIBUTED for c in curves):
+        return verdict
+    tied = any(verdict.indistinguishable_from(name) for name in verdict.added) or bool(result.faults_instead)
+    return replace(verdict, kind=INDISTINGUISHABLE if tied else MISSING)
 
 
 def alternatives(result: SearchResult, verdict: Verdict) -> dict[str, Model]:
@@ -184,6 +200,8 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     if verdict.kind == DATA_SHEET:
         return " ".join(["Data sheet:", *data_sheet_sentences(result), *aside, fell, left, NO_EFFECT])
     beside = [*data_sheet_sentences(result), *recording_sentences(result), *aside]
+    if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > UNEXPLAINED:
+        beside.append(f"No law at any place explains a tenth of the rest. {remainder_sentence(result.remainders)}")
     if verdict.kind == MISSING:
         return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict), *beside])
     if verdict.kind == INDISTINGUISHABLE:
