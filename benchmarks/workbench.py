@@ -286,7 +286,7 @@ def measured(bench: Workbench, folder: Path, options: argparse.Namespace) -> boo
         medians, worst, missing = zip(*turns, strict=True)
         each = " ".join(f"{p:.3f}" for p in worst)
         print(
-            f"{what}: jitter of the plant {statistics.median(medians):.3f} ms, its p99 {statistics.median(worst):.3f} ms"
+            f"{what}: jitter {statistics.median(medians):.3f} ms, p99 {statistics.median(worst):.3f} ms"
             f" (turns: {each}); the recorder lost {sum(missing)}"
         )
     return not all(good for *_, good in rows) or sum(n for *_, n in with_page) > sum(n for *_, n in without)
