@@ -14,8 +14,8 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array, Mask
 
-AGREED = 50.0  # squared size over its variance on segments for fitting (chance and wrong noise gave 44 and less), …
-CONFIRMED = 6.0  # … and on those for validation, which no fit has seen: chance gives that once in 140 times
+AGREED = 50.0  # squared size over its variance on segments for fitting, …
+CONFIRMED = 10.0  # … and on those for validation: chance and wrong noise gave 44 and less, effects 80 and more
 
 
 def agreed(before: Sequence[Array], after: Sequence[Array], fit: Sequence[Mask]) -> bool:

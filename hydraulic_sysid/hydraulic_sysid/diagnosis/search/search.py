@@ -348,7 +348,9 @@ class Search:
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
             places = [self.in_place_of(strict, done, d, moved) for d in moved]
             best = min((s for _, states in places for s in states), key=lambda s: s.misfit.total, default=done)
-            if self.better(done, best):
+            clear = CLEAR * least_cost(done.misfit.count, done.misfit.variance)
+            # All numbers together may do what an effect does, too.
+            if min(done.misfit.total, final.misfit.total) - best.misfit.total > clear:
                 place = next(i for i, (_, states) in enumerate(places) if any(s is best for s in states))
                 name, without = _new(best, strict), places[place][0]
                 return replace(
