@@ -610,7 +610,10 @@ class Search:
         :raises OutOfTimeError: before there was anything.
         """
         try:
-            return accidents_named(self.set_against_faults(self.concluded(decisive(self.searched()))))
+            found = accidents_named(self.set_against_faults(self.concluded(decisive(self.searched()))))
+            if found.added and found.base.scores:  # not those beside the effects that were found last
+                self._show(found.base, found.base.scores, found.base.refits)
+            return found
         except (OutOfTimeError, KeyboardInterrupt):
             if not self.path:
                 raise
