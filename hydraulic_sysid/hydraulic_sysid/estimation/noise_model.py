@@ -34,6 +34,7 @@ LOADING = 1e-5  # of the variance, added as a white part: no noise is without on
 QUIET = 0.2  # quantile of the segments' mean squares from which the noise is judged
 WITHIN = 3.5  # standard deviations of a mean square above which a segment holds more than noise
 OUTLIER = 6.0  # innovations' standard deviations
+AROUND = (1, 9)  # segments and samples that are beside one
 JUMP = 0.5  # of what a spike is off the residuals beside it, by which it is off the readings beside it
 SPIKY = 1e-3  # share of samples of a channel that stand alone by themselves: it is known to have spikes
 MAINS = (50.0, 60.0)  # Hz
@@ -196,8 +197,7 @@ def outliers(residuals: Array, noise: ChannelNoise) -> Mask:
 
     A model's error lasts; a spike does not, so that it stands out from the residuals beside it as well.
     """
-    around = median_filter(np.abs(residuals), size=(1, 9))
-    return np.abs(residuals) > OUTLIER * np.maximum(noise.std, 3.0 * around)
+    return _stands_out(np.abs(residuals), noise)
 
 
 def jumps(residuals: Array, noise: ChannelNoise, readings: Array) -> Mask:
@@ -205,11 +205,15 @@ def jumps(residuals: Array, noise: ChannelNoise, readings: Array) -> Mask:
 
     For channels that are known to have spikes: where a model is far off, what is no spike may look alike.
     """
-    off = np.abs(residuals - median_filter(residuals, size=(1, 9)))
+    off = np.abs(residuals - median_filter(residuals, size=AROUND))
     padded = np.pad(readings, ((0, 0), (2, 2)), mode="reflect", reflect_type="odd")
     beside = np.median([padded[:, k : k + readings.shape[1]] for k in (0, 1, 3, 4)], axis=0)
-    far = off > OUTLIER * np.maximum(noise.std, 3.0 * median_filter(off, size=(1, 9)))
-    return np.asarray(far & (np.abs(readings - beside) > JUMP * off))
+    return _stands_out(off, noise) & (np.abs(readings - beside) > JUMP * off)
+
+
+def _stands_out(off: Array, noise: ChannelNoise) -> Mask:
+    """Which of these sizes (S, n) are far beyond the noise, and beyond those beside them."""
+    return np.asarray(off > OUTLIER * np.maximum(noise.std, 3.0 * median_filter(off, size=AROUND)))
 
 
 def mains_lines(residual: Array, dt: float) -> tuple[float, ...]:

@@ -21,7 +21,7 @@ SHAPES = (1.0, 0.3, 3.0, 8.0)  # of the default
 SIZES = (1.0, 0.25)  # of the default, measured from the null value
 LARGE = (10.0,)  # where those change nothing, …
 SMALL = (0.1, 0.02)  # … and where the plant is too small for them
-MOST_SHAPES = 24
+MOST_SHAPES = 7
 FREQUENCIES = (1.0, 0.5, 0.25, 2.0, 4.0)  # of the default at which a resonance is looked for, …
 WIDE = 8.0  # … so many times as much damped: that of a light damping shows at its own frequency alone
 ANGLE = "rad"
@@ -100,12 +100,10 @@ def probes(effect: Effect, features: RecordFeatures, sizes: Sequence[float] = SI
     moved = [p for p in effect.parameters if p.null is not None and p.free]
     grids = [_grid(p, features) for p in shape]
     first = tuple(g[0] for g in grids)
-    single = [c for c in itertools.product(*grids) if c != first and _changes(c, first) == 1]
-    tried = list(dict.fromkeys([first, *_resonances(shape, grids), *single]))
+    tried = [first] + [c for c in itertools.product(*grids) if c != first and _changes(c, first) == 1]
+    tried = [*tried[: MOST_SHAPES + len(features.lines)], *_resonances(shape, grids)]
     # An angle says nothing without the right frequency, nor the other way round: all of one with all of the other.
-    for values, turned in itertools.product(
-        tried[: MOST_SHAPES + len(features.lines)], itertools.product(QUARTERS, repeat=len(angles))
-    ):
+    for values, turned in itertools.product(tried, itertools.product(QUARTERS, repeat=len(angles))):
         given = {f"{effect.name}.{p.name}": v for p, v in zip([*shape, *angles], [*values, *turned], strict=True)}
         for size in sizes if values == first else sizes[:1]:
             yield [_probe(effect, given, p, size) for p in moved]

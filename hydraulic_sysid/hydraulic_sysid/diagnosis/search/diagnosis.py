@@ -104,9 +104,10 @@ def diagnose(
     proxy = explained(found.base.misfit, found.final.misfit) < HOPELESS
     suspect = found.base if proxy else found.final
     curves = nonparametric_curves(suspect.linearisation, say) if outside else []
-    verdict = verdicts.reviewed(verdict, found, curves)
-    outside = verdict.kind == verdicts.OUTSIDE
-    curves = curves if outside else []
+    if outside:
+        verdict = verdicts.reviewed(verdict, found, curves)
+        outside = verdict.kind == verdicts.OUTSIDE
+        curves = curves if outside else []
     beside = () if suspect is found.base else tuple(found.added)
     remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
     known = parameter_errors(found.final.linearisation)

@@ -347,14 +347,14 @@ class Search:
         done, moved = self.fewest_moved(final, strict if final is base else None)
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
             places = [self.in_place_of(strict, done, d, moved) for d in moved]
-            best = min((s for _, states in places for s in states), key=lambda s: s.misfit.total, default=done)
+            every = [(state, i) for i, (_, states) in enumerate(places) for state in states]
+            best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
             clear = CLEAR * least_cost(done.misfit.count, done.misfit.variance)
             # All numbers together may do what an effect does, too.
             if min(done.misfit.total, final.misfit.total) - best.misfit.total > clear:
-                place = next(i for i, (_, states) in enumerate(places) if any(s is best for s in states))
-                name, without = _new(best, strict), places[place][0]
+                name = _new(best, strict)
                 return replace(
-                    found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without},
+                    found, base=strict, final=best, misfits={name: best.misfit}, competing={name: places[place][0]},
                     moved=tuple(d for i, d in enumerate(moved) if i != place),
                 )  # fmt: skip
             moved = [

@@ -85,24 +85,13 @@ def judge(result: SearchResult) -> Verdict:
     final = result.final.misfit
     competing = {name: competing_models(name, state, final) for name, state in result.competing.items()}
     family = families(result.model, result.added, result.split.channels)
-    rivals = any(not c.distinguishable for every in competing.values() for c in every)
-    tied = rivals or bool(family) or bool(result.faults_instead)
-    return Verdict(kind_of(result, tied), result.added, competing, family)
+    return reviewed(Verdict(COMPLETE, result.added, competing, family), result)
 
 
-def reviewed(verdict: Verdict, result: SearchResult, curves: Sequence[NonparametricCurve]) -> Verdict:
-    """The verdict once it is known what ``curves`` explain of what is left.
-
-    Where effects explain the most and no curve at any place a part of the rest, that is how far their laws are off
-    those of the bench (the touch of a backlash, the start of a cushion): nothing else is missing.
-    """
-    if verdict.kind != OUTSIDE or not result.added or strained(result):
-        return verdict
-    share = unexplained_share(result.base.misfit, result.final.misfit)
-    if share > SMALL_UNEXPLAINED or any(c.share >= UNATTRIBUTED for c in curves):
-        return verdict
+def reviewed(verdict: Verdict, result: SearchResult, curves: Sequence[NonparametricCurve] | None = None) -> Verdict:
+    """The verdict with its kind, once it is known what ``curves`` explain of what is left, if they were looked for."""
     tied = any(verdict.indistinguishable_from(name) for name in verdict.added) or bool(result.faults_instead)
-    return replace(verdict, kind=INDISTINGUISHABLE if tied else MISSING)
+    return replace(verdict, kind=kind_of(result, tied, curves))
 
 
 def alternatives(result: SearchResult, verdict: Verdict) -> dict[str, Model]:
@@ -132,8 +121,12 @@ def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dic
     return found
 
 
-def kind_of(result: SearchResult, tied: bool) -> str:
-    """The verdict's kind; ``tied``: whether anything may be in the place of what was added."""
+def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurve] | None = None) -> str:
+    """The verdict's kind; ``tied``: whether anything may be in the place of what was added.
+
+    Where effects explain the most and none of the ``curves`` a part of the rest, that is how far their laws are off
+    those of the bench (the touch of a backlash, the start of a cushion): nothing else is missing.
+    """
     if result.stopped:
         return UNDECIDED
     final = result.final.misfit
@@ -145,7 +138,8 @@ def kind_of(result: SearchResult, tied: bool) -> str:
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
-    allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if final.variance < SMALL else UNEXPLAINED
+    details = final.variance < SMALL or (curves is not None and all(c.share < UNATTRIBUTED for c in curves))
+    allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if details else UNEXPLAINED
     if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
     return INDISTINGUISHABLE if tied else MISSING
@@ -201,7 +195,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         return " ".join(["Data sheet:", *data_sheet_sentences(result), *aside, fell, left, NO_EFFECT])
     beside = [*data_sheet_sentences(result), *recording_sentences(result), *aside]
     if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > UNEXPLAINED:
-        beside.append(f"No law at any place explains a tenth of the rest. {remainder_sentence(result.remainders)}")
+        beside.append(remainder_sentence(result.remainders))
     if verdict.kind == MISSING:
         return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict), *beside])
     if verdict.kind == INDISTINGUISHABLE:

@@ -32,14 +32,15 @@ class Pacer:
     def wait(self, deadline_ns: int) -> int:
         """Return at `deadline_ns` of `time.monotonic_ns`, at once if it has passed; gives the time then."""
         clock = time.monotonic_ns
-        rest = deadline_ns - clock() - self._spin_ns
+        now = clock()
+        rest = deadline_ns - now - self._spin_ns
         if rest > 0:
             time.sleep(rest * 1e-9)
-            if clock() > deadline_ns:
+            now = clock()
+            if now > deadline_ns:
                 self._spin_ns = min(self._spin_ns + _GROW_NS, _MOST_SPIN_NS)
             else:
                 self._spin_ns = max(self._spin_ns - _SHRINK_NS, self._least_ns)
-        now = clock()
         while now < deadline_ns:
             now = clock()
         return now
