@@ -86,6 +86,7 @@ def test_a_simulator_hides_the_effects_that_are_chosen(page: Any, picture: Calla
     picture(page, "plant-hidden-effects")
     page.click("#start-simulator")
     page.click("dialog .primary")  # it replaces the virtual bench
+    until(page, "workbench.state.bench.plant.effects?.includes('valve_deadband')")  # not what the one before said last
     page.wait_for_selector("#enable:not([disabled])")
     plant = page.evaluate("workbench.state.bench.plant")
     assert plant["model"] == "mod-sample_bench"
