@@ -212,7 +212,7 @@ def test_what_an_effect_leaves_decides_whether_it_is_the_one(model, before: floa
 @pytest.mark.parametrize(
     ("share", "kind"),
     [
-        (None, verdict.OUTSIDE),  # no curves were looked for
+        (None, verdict.OUTSIDE),  # there are no curves: nothing is known of it
         (0.15, verdict.OUTSIDE),  # a law at some place explains part of what is left
         (0.05, verdict.MISSING),  # none does: the effect's law is not quite the bench's
     ],
@@ -220,7 +220,7 @@ def test_what_an_effect_leaves_decides_whether_it_is_the_one(model, before: floa
 def test_what_no_curve_explains_is_no_other_effect(model, share: float | None, kind: str) -> None:
     base, final = state(model, 30000.0, {}), state(model.with_effect("constant_load"), 12000.0, {})
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
-    curves = None if share is None else [SimpleNamespace(share=share)]
+    curves = [] if share is None else [SimpleNamespace(share=share)]
     assert verdict.kind_of(found, tied=False, curves=curves) == kind
 
 

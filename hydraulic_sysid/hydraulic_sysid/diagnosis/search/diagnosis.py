@@ -103,8 +103,9 @@ def diagnose(
     # Where most is left, what was added is a proxy for something else, and bends curves and balances.
     proxy = explained(found.base.misfit, found.final.misfit) < HOPELESS
     suspect = found.base if proxy else found.final
-    curves = nonparametric_curves(suspect.linearisation, say) if outside else []
+    curves: list[NonparametricCurve] = []
     if outside:
+        curves = nonparametric_curves(suspect.linearisation, say)
         verdict = verdicts.reviewed(verdict, found, curves)
         outside = verdict.kind == verdicts.OUTSIDE
         curves = curves if outside else []

@@ -88,8 +88,8 @@ def judge(result: SearchResult) -> Verdict:
     return reviewed(Verdict(COMPLETE, result.added, competing, family), result)
 
 
-def reviewed(verdict: Verdict, result: SearchResult, curves: Sequence[NonparametricCurve] | None = None) -> Verdict:
-    """The verdict with its kind, once it is known what ``curves`` explain of what is left, if they were looked for."""
+def reviewed(verdict: Verdict, result: SearchResult, curves: Sequence[NonparametricCurve] = ()) -> Verdict:
+    """The verdict with its kind; ``curves``: what any law may explain of what is left, where that is known."""
     tied = any(verdict.indistinguishable_from(name) for name in verdict.added) or bool(result.faults_instead)
     return replace(verdict, kind=kind_of(result, tied, curves))
 
@@ -121,7 +121,7 @@ def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dic
     return found
 
 
-def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurve] | None = None) -> str:
+def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurve] = ()) -> str:
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added.
 
     Where effects explain the most and none of the ``curves`` a part of the rest, that is how far their laws are off
@@ -138,7 +138,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
-    details = final.variance < SMALL or (curves is not None and all(c.share < UNATTRIBUTED for c in curves))
+    details = final.variance < SMALL or (bool(curves) and all(c.share < UNATTRIBUTED for c in curves))
     allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if details else UNEXPLAINED
     if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
