@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,6 +17,7 @@ from hydraulic_workbench.diagnostics import HealthBoard, Row
 from hydraulic_workbench.errors import NotNowError, UnknownError, WorkbenchError
 from hydraulic_workbench.folder import Folder, checked_name
 from hydraulic_workbench.guess import candidates, draw
+from hydraulic_workbench.plant import Plant
 from hydraulic_workbench.plant_kinds import Chosen, checked_hidden
 from hydraulic_workbench.progress_log import ProgressLog
 from hydraulic_workbench.timeline import Step, Timeline
@@ -155,6 +158,20 @@ def test_health_is_as_bad_as_its_worst_row_and_ages(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(time, "monotonic", lambda: now + 100.0)
     board.take([])
     assert not board.rows
+
+
+def test_what_a_plant_says_while_it_ends_is_not_taken_for_the_next_one() -> None:
+    health, board = HealthBoard(), SimpleNamespace(change=lambda *_, **__: None)
+    last_words = [Row("/actuator/plant: plant", 0, "", {"enabled": "True"}, time.monotonic())]
+
+    async def nothing_commands() -> None: ...
+
+    async def stop(child: object) -> None:
+        health.take(last_words)
+
+    plant: Any = Plant(board, SimpleNamespace(), SimpleNamespace(stop=stop), health, nothing_commands)  # type: ignore[arg-type]
+    asyncio.run(plant.stop())
+    assert not health.rows
 
 
 def test_progress_is_read_from_a_log_that_grows(tmp_path: Path) -> None:

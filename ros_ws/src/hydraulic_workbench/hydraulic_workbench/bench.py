@@ -66,7 +66,7 @@ class Bench:
         self.health = HealthBoard()
         self.processes = Processes(self.folder, env)
         self.library = Library(self.folder, self.workers, self.hub)
-        self.plant = Plant(self.board, graph, self.processes, self._leave_plant)
+        self.plant = Plant(self.board, graph, self.processes, self.health, self._leave_plant)
         lockstep = lambda: self.plant.chosen.lockstep  # noqa: E731
         self.live_model = LiveModel(self.board, self.processes)
         self.controller = Controller(self.board, graph, self.processes, lockstep)
@@ -238,7 +238,6 @@ class Bench:
         await self.experiments.stop()
         await self.reference.node.stop()
         await self.controller.node.stop()
-        self.health.rows.clear()
 
     async def _recorded(self, bag: Path, plan: Entry, ended: str) -> str:
         kind = self.plant.chosen.kind
@@ -252,7 +251,7 @@ class Bench:
         while True:
             await asyncio.sleep(_WATCH_S)
             count += 1
-            self.plant.watch(self.health)
+            self.plant.watch()
             heard = {row.name.partition(":")[0].rpartition("/")[2] for row in self.health.rows.values()}
             for follower, node in (
                 (self.live_model.node, "estimator"),

@@ -32,10 +32,15 @@ def plain_words(tail: str) -> str:
 
 
 class Plant:
-    """One plant at a time. ``left`` is called before one ends: what commands it ends first."""
+    """One plant at a time. ``left`` is called before one ends: what commands it ends first.
 
-    def __init__(self, board: Board, graph: Graph, processes: Processes, left: Callable[[], Awaitable[None]]) -> None:
-        self._board, self._graph, self._processes, self._left = board, graph, processes, left
+    ``health`` is what is heard of it; what one plant said is forgotten once it has ended.
+    """
+
+    def __init__(
+        self, board: Board, graph: Graph, processes: Processes, health: HealthBoard, left: Callable[[], Awaitable[None]]
+    ) -> None:
+        self._board, self._graph, self._processes, self._health, self._left = board, graph, processes, health, left
         self.chosen = NOTHING
         self._child: Child | None = None
         self._devices: Child | None = None
@@ -138,6 +143,7 @@ class Plant:
         self._faults = []
         await self._processes.stop(plant)
         await self._processes.stop(devices)
+        self._health.rows.clear()
 
     async def enable(self, on: bool) -> Said:
         """Let commands through, or no longer."""
@@ -170,13 +176,13 @@ class Plant:
             raise NotNowError("the virtual devices have ended") from None
         self._faults = [{**r, "on": on} if r is row else r for r in self._faults]
 
-    def watch(self, health: HealthBoard) -> None:
+    def watch(self) -> None:
         """Put on the board how the plant is now; to be called some times a second."""
         if self.running and self._child is not None and self._child.exit_code is not None:
             self._say("failed", f"the plant has ended by itself: {self._child.ending()}\n{self._child.tail()}")
         own = absolute(PLANT_NODE, self._graph.namespace)
-        plant, command = health.values(f"{own}: plant"), health.values(f"{own}: command")
-        row = health.rows.get(f"{own}: plant")
+        plant, command = self._health.values(f"{own}: plant"), self._health.values(f"{own}: command")
+        row = self._health.rows.get(f"{own}: plant")
         enabled, stopped = plant.get("enabled") == "True", plant.get("emergency_stop") == "True"
         active = self.running and bool(plant)
         hidden = self.chosen.kind == GUESS
