@@ -127,7 +127,7 @@ def test_an_approach_centres_the_piston_and_lifts_the_travel_limit(model) -> Non
     arrived = played.record["position"][round(plan.approach * plan.rate)]
     assert abs(arrived) < 0.01
     stuck = replace(plan, approach_gain=0.0)
-    assert "the piston is at 0.5" in simulate_plan(stuck, Plant(model), position=0.5).aborted
+    assert "the piston is at 500." in simulate_plan(stuck, Plant(model), position=0.5).aborted
 
 
 def test_without_an_approach_a_run_is_as_before() -> None:

@@ -109,8 +109,8 @@ def test_no_position_drives_beyond_the_limit(position, gain, authority, limit):
 @pytest.mark.parametrize(
     ("position", "words"),
     [
-        (0.3001, "the piston is at 0.3001 m (allowed: -0.3000 … 0.3000 m)"),
-        (-0.31, "the piston is at -0.3100 m"),
+        (0.3001, "the piston is at 300.1 mm (allowed: -300.0 … 300.0 mm)"),
+        (-0.31, "the piston is at -310.0 mm"),
         (math.nan, "the position is nan"),
         (math.inf, "the position is inf"),
     ],
@@ -129,7 +129,7 @@ def test_a_bad_position_aborts_at_once_and_for_good(position, words):
 def test_the_travel_guard_also_watches_a_piston_that_drifts_at_rest():
     run = ExcitationRun(plan(Steps([0.0], 1.0), rest_before=1.0))
     play(run, position=0.25, drift=0.1)
-    assert run.phase is Phase.ABORTED and "the piston is at 0.3" in run.reason
+    assert run.phase is Phase.ABORTED and "the piston is at 300." in run.reason
 
 
 @pytest.mark.parametrize(

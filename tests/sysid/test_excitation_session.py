@@ -154,7 +154,7 @@ def test_a_piston_that_runs_away_ends_the_run():
     bench = Bench().run(500)
     bench.position = 0.31
     assert bench.run(1).commands[-1] == 0.0
-    assert "the piston is at 0.3100 m" in bench.events[-1]["reason"]
+    assert "the piston is at 310.0 mm" in bench.events[-1]["reason"]
 
 
 def test_a_position_that_is_no_number_ends_the_run():

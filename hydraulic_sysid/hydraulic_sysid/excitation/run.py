@@ -116,8 +116,8 @@ class ExcitationRun:
         if not math.isfinite(position):
             self.abort(f"the position is {position}")
         elif abs(position - plan.centre) > plan.travel_limit and self._index >= self._approach:
-            limits = f"{plan.centre - plan.travel_limit:.4f} … {plan.centre + plan.travel_limit:.4f} m"
-            self.abort(f"the piston is at {position:.4f} m (allowed: {limits})")
+            low, high = 1e3 * (plan.centre - plan.travel_limit), 1e3 * (plan.centre + plan.travel_limit)
+            self.abort(f"the piston is at {1e3 * position:.1f} mm (allowed: {low:.1f} … {high:.1f} mm)")
         if applied is not None and self._applied_check is not None:
             fault = self._applied_check.fault(t, applied)
             if fault:

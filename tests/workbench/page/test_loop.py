@@ -31,6 +31,7 @@ def page(bench: Any) -> Iterator[Any]:
 
 
 def test_a_hidden_effect_is_named_and_added_within_twelve_clicks(page: Any, picture: Callable[..., None]) -> None:
+    page.wait_for_selector("#start-guess")
     picture(page, "loop-1-plant")
     page.click("#start-guess")
     page.click("#enable")

@@ -1,6 +1,7 @@
 // The live view: panels over one time that runs along, stands still, or shows a part that was zoomed into.
 import { live, onEpoch } from "../core/stream.js";
 import { changed } from "../core/store.js";
+import { heading, words } from "../core/format.js";
 import { LivePanel } from "./live_panel.js";
 import { AXIS_PX } from "./axes.js";
 
@@ -219,8 +220,7 @@ export class LiveStrips extends HTMLElement {
 }
 
 function titleOf(group, columns) {
-  const text = group.startsWith("residual_") ? "residual" : columns.length > 1 ? group.replaceAll("_", " ") : columns[0].title;
-  return text[0].toUpperCase() + text.slice(1);
+  return heading(group.startsWith("residual_") ? "residual" : columns.length > 1 ? words(group) : columns[0].title);
 }
 
 customElements.define("live-strips", LiveStrips);

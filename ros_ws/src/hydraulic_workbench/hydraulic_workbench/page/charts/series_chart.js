@@ -167,6 +167,7 @@ export class SeriesChart extends HTMLElement {
 
   drawLines(plot) {
     const { ctx, bbox } = plot;
+    const named = []; // where a name stands: none over another
     ctx.save();
     for (const line of this.spec.lines ?? []) {
       const y = Math.round(plot.valToPos(line.value, "y", true)) + 0.5;
@@ -184,7 +185,11 @@ export class SeriesChart extends HTMLElement {
       ctx.textAlign = line.left ? "left" : "right";
       const upper = y < bbox.top + bbox.height / 2;
       const below = line.left ? !upper : upper; // a limit's name inside its limit, that of the stroke's end outside
-      ctx.fillText(line.title, line.left ? bbox.left + 4 : bbox.left + bbox.width - 4, y + (below ? 13 : -4) * devicePixelRatio);
+      const place = [below, !below].map((under) => y + (under ? 13 : -4) * devicePixelRatio)
+        .find((at) => !named.some((one) => one.left === line.left && Math.abs(one.at - at) < 12 * devicePixelRatio));
+      if (place === undefined) continue;
+      named.push({ left: line.left, at: place });
+      ctx.fillText(line.title, line.left ? bbox.left + 4 : bbox.left + bbox.width - 4, place);
     }
     ctx.restore();
   }

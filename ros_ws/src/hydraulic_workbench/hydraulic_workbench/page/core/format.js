@@ -54,8 +54,11 @@ export function clock(unix) {
   return then.toDateString() === new Date().toDateString() ? time : `${then.toLocaleDateString()} ${time}`;
 }
 
-/** "valve_deadband" as words. */
-export const words = (name) => String(name ?? "").replaceAll("_", " ");
+/** "valve_deadband" as words; a port keeps its capital: "pressure A". */
+export const words = (name) => String(name ?? "").replaceAll("_", " ").replace(/\b[ab]$/, (port) => port.toUpperCase());
+
+/** Words as a heading: its first letter is a capital. */
+export const heading = (text) => text[0].toUpperCase() + text.slice(1);
 
 /** The last parts of a path; the whole is for a tooltip. */
 export function shortPath(path, parts = 2) {

@@ -2,7 +2,7 @@
 import { html, nothing } from "../core/html.js";
 import { changed } from "../core/store.js";
 import { displayOf } from "../core/quantities.js";
-import { digits, words } from "../core/format.js";
+import { digits, heading, words } from "../core/format.js";
 import { reportFigure } from "./figures.js";
 import "../charts/series_chart.js";
 
@@ -17,7 +17,7 @@ function build(segment) {
     const { factor, unit } = displayOf(unitOf(name));
     const line = (title, value, colour, width) => ({ title, time: segment.time, value, factor, colour, width });
     return {
-      title: words(name)[0].toUpperCase() + words(name).slice(1), unit, sync: "segment", height: 165,
+      title: heading(words(name)), unit, sync: "segment", height: 165,
       series: [line("measured", channel.measured, "curve-6", 2.5), line("before", channel.before, "curve-2", 1.6), line("after", channel.after, "curve-3", 1.6)],
     };
   });

@@ -4,7 +4,7 @@ import { state, update } from "../core/store.js";
 import { operates, plant, plantRuns, recordOf, runs, jobOf, enable, open } from "../core/actions.js";
 import { post } from "../core/api.js";
 import { attempt } from "../core/messages.js";
-import { digits, duration, percent, words } from "../core/format.js";
+import { digits, duration, heading, percent, words } from "../core/format.js";
 import { checkIcon, crossIcon, lockIcon, warnIcon } from "../core/icons.js";
 import { choose, chosenPlan, rehearsal, rehearse } from "./rehearsals.js";
 import { rehearsalCharts } from "./rehearsal_charts.js";
@@ -36,8 +36,6 @@ function check(good, title, text, level = good ? "ok" : "stop", used = null, act
     ${action}</li>`;
 }
 
-const sentence = (text) => text[0].toUpperCase() + text.slice(1);
-
 /** What must hold before Start; the server asks the same again. */
 function gate(now) {
   const doc = now?.doc;
@@ -45,7 +43,7 @@ function gate(now) {
   const items = [];
   if (!now || runs(jobOf(now.job))) items.push(check(false, "Rehearsal", "runs on the model …", "wait"));
   else if (now.error) items.push(check(false, "Rehearsal", now.error, "stop", null, html`<button class="small" @click=${() => rehearse(chosenPlan(), true)}>Again</button>`));
-  for (const one of doc?.checks ?? []) items.push(check(one.good, sentence(one.title), one.text, one.level, one.name === "identifiability" ? null : one.used));
+  for (const one of doc?.checks ?? []) items.push(check(one.good, heading(one.title), one.text, one.level, one.name === "identifiability" ? null : one.used));
   items.push(check(plantRuns() && !stopped, "Plant", plantRuns() ? (stopped ? "stopped: reset it first" : "runs") : "none runs", undefined, null,
     plantRuns() ? nothing : html`<button class="small" @click=${() => open("plant")}>Choose one</button>`));
   if (plantRuns() && !stopped) {

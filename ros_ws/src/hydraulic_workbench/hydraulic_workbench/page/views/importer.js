@@ -4,7 +4,7 @@ import { state, changed, update } from "../core/store.js";
 import { path, post, put, remove } from "../core/api.js";
 import { attempt, say } from "../core/messages.js";
 import { operates } from "../core/actions.js";
-import { digits, duration } from "../core/format.js";
+import { digits, duration, words } from "../core/format.js";
 import { columnsForm } from "./columns.js";
 import "../charts/series_chart.js";
 
@@ -106,7 +106,7 @@ function curves(shown) {
   if (!shown.traces) return nothing;
   if (!charts.has(shown)) {
     charts.set(shown, Object.entries(shown.traces).map(([name, one], k) => ({
-      title: name.replaceAll("_", " "), unit: one.display.unit, sync: "import", height: 120,
+      title: words(name), unit: one.display.unit, sync: "import", height: 120,
       series: [{ title: "", time: one.time, value: one.value, factor: one.display.factor, colour: `curve-${1 + (k % 6)}` }],
     })));
   }

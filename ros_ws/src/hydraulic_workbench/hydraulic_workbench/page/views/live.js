@@ -5,7 +5,7 @@ import { post } from "../core/api.js";
 import { attempt } from "../core/messages.js";
 import { live } from "../core/stream.js";
 import { operates, plantRuns, open } from "../core/actions.js";
-import { digits } from "../core/format.js";
+import { digits, words } from "../core/format.js";
 import { displayOf } from "../core/quantities.js";
 import { pauseIcon, playIcon } from "../core/icons.js";
 import "../charts/live_strips.js";
@@ -30,7 +30,7 @@ function toolbar() {
     </div>
     <details class="menu"><summary class="button">Panels</summary>
       <div class="card popup stack tight">${groups.map((group) => html`<label class="check">
-        <input type="checkbox" .checked=${strips.shows(group)} @change=${() => strips.toggle(group)}> ${group.replaceAll("_", " ")}</label>`)}</div>
+        <input type="checkbox" .checked=${strips.shows(group)} @change=${() => strips.toggle(group)}> ${words(group)}</label>`)}</div>
     </details>
     <details class="menu"><summary class="button">Overlay</summary>${overlayMenu()}</details>
     <span class="soft small push hint">drag to zoom · click for cursors A, B · double click to follow</span>

@@ -2,7 +2,7 @@
 import { html, nothing } from "../core/html.js";
 import { state, update } from "../core/store.js";
 import { open } from "../core/actions.js";
-import { digits, percent, words } from "../core/format.js";
+import { digits, duration, percent, words } from "../core/format.js";
 import { quantity } from "../core/quantities.js";
 import { fallingSteps } from "./falling.js";
 
@@ -35,7 +35,7 @@ export function nextExperimentResult(doc, job) {
     <div class="scroll"><table><thead><tr><th>If this is true</th><th>and this is fitted</th><th class="number">Separation</th><th class="number">Mistaken with</th></tr></thead>
       <tbody>${(doc.pairs ?? []).map((one) => html`<tr><th>${words(one.true)}</th><td>${words(one.refitted)}</td><td class="number">${digits(one.separation, 3)}</td>
         <td class="number">${percent(one.misclassification_probability)}</td></tr>`)}</tbody></table></div>
-    <ul class="findings">${(doc.movements ?? []).map((one) => html`<li>${one.description}</li>`)}</ul></section>`;
+    <ul class="findings">${(doc.movements ?? []).map((one) => html`<li>from ${duration(one.start)}: ${one.description}</li>`)}</ul></section>`;
 }
 
 export function plainResult(doc) {

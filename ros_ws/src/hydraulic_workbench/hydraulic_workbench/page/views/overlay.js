@@ -4,7 +4,7 @@ import { state, changed, update } from "../core/store.js";
 import { get } from "../core/api.js";
 import { attempt } from "../core/messages.js";
 import { recordOf } from "../core/actions.js";
-import { words } from "../core/format.js";
+import { heading, words } from "../core/format.js";
 import "../charts/series_chart.js";
 
 const POINTS = 1600;
@@ -45,7 +45,7 @@ function chart(name, series) {
   const shown = series.map((one, k) => ({ one, k })).filter(({ one }) => one.channels[name]);
   const display = shown[0]?.one.channels[name].display ?? { factor: 1, unit: "" };
   return {
-    title: words(name)[0].toUpperCase() + words(name).slice(1), unit: display.unit, sync: "overlay", height: 180,
+    title: heading(words(name)), unit: display.unit, sync: "overlay", height: 180,
     series: shown.map(({ one, k }) => ({
       title: one.title, time: one.channels[name].time, value: one.channels[name].value, factor: display.factor, colour: COLOURS[k],
     })),

@@ -5,7 +5,7 @@ import { path, remove } from "../core/api.js";
 import { attempt } from "../core/messages.js";
 import { ask } from "../core/dialogs.js";
 import { operates } from "../core/actions.js";
-import { clock, digits, duration, shortPath } from "../core/format.js";
+import { clock, digits, duration, shortPath, words } from "../core/format.js";
 import { uploadIcon } from "../core/icons.js";
 import { diagnoseRecord } from "./diagnosis_steps.js";
 import { importer, take, takeFiles } from "./importer.js";
@@ -35,7 +35,7 @@ function row(record) {
       @change=${(event) => show(record, event.target.checked)}></td>
     <th title=${record.file}>${record.name}<br><span class="soft small">${SOURCES[record.source] ?? record.source} ${clock(record.created)}</span></th>
     <td class="number">${duration(record.duration)}<br><span class="soft small">${record.sampling_time ? `${digits(1 / record.sampling_time, 4)} Hz` : ""}</span></td>
-    <td class="small soft channels">${record.problem ? html`<span class="chip poor" title=${record.problem}>unreadable</span> ${record.problem}` : record.channels.join(", ").replaceAll("_", " ")}
+    <td class="small soft channels">${record.problem ? html`<span class="chip poor" title=${record.problem}>unreadable</span> ${record.problem}` : record.channels.map(words).join(", ")}
       ${record.columns ? html`<br><span title=${record.columns}>columns: ${shortPath(record.columns)}</span>` : nothing}</td>
     <td class="row-actions"><button class="small" ?disabled=${!operates() || Boolean(record.problem)} @click=${() => diagnoseRecord(record)}>Diagnose</button>
       <button class="small quiet" ?disabled=${!operates()} aria-label=${`Take ${record.name} off the list`} title="Take it off the list" @click=${() => forget(record)}>×</button></td>
