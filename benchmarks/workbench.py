@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 from domain_coordinator import domain_id
 from playwright.sync_api import Page, sync_playwright
+from scipy.stats import mannwhitneyu
 
 from abuse.running import memory_mb
 from hydraulic_node_utils.nodes import middleware
@@ -214,6 +215,8 @@ def main() -> int:
     parser.add_argument("--stops", type=int, default=40, help="presses of the stop button (default 40)")
     parser.add_argument("--turns", type=int, default=6, help="recordings without and with a page (default 6 of each)")
     options = parser.parse_args()
+    if min(options.seconds, options.stops, options.turns) <= 0:
+        parser.error("--seconds, --stops and --turns must be positive")
     middleware.set_up()
     with domain_id() as domain, tempfile.TemporaryDirectory() as name:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
@@ -289,6 +292,8 @@ def measured(bench: Workbench, folder: Path, options: argparse.Namespace) -> boo
             f"{what}: jitter {statistics.median(medians):.3f} ms, p99 {statistics.median(worst):.3f} ms"
             f" (turns: {each}); the recorder lost {sum(missing)}"
         )
+    chance = mannwhitneyu([p for _, p, _ in with_page], [p for _, p, _ in without], alternative="greater").pvalue
+    print(f"p99 of that many turns would differ so, or more, by chance with a probability of {chance:.2f}")
     return not all(good for *_, good in rows) or sum(n for *_, n in with_page) > sum(n for *_, n in without)
 
 
