@@ -101,7 +101,9 @@ def test_a_plan_that_leaves_its_limits_cannot_be_started(page: Any, picture: Cal
     page.click(".plan:has-text('too_far')")
     page.wait_for_selector("[aria-label=Gate] .chip:has-text('rehearsal failed')")
     assert page.locator("#start-experiment").is_disabled()
-    assert page.locator("ul.gate .gate-poor strong").all_inner_texts() == ["Plays to its end"], "all else is well"
+    first, *others = page.locator("ul.gate .gate-poor strong").all_inner_texts()
+    # The last sample before the end lies on the one or the other side of the limit.
+    assert first == "Plays to its end" and set(others) <= {"Travel"}, "all else is well"
     picture(page, "experiment-refused")
     rehearsal = page.evaluate("workbench.state.jobs.find((one) => one.plan === 'plan-too_far')")
     assert rehearsal["good"] is False
