@@ -22,8 +22,7 @@ from .trajectory import PlantState, Trajectory
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 FIT_STEP, FIT_REFINEMENT = 1e-3, 2.2  # half as fine: off by a hundredth of the sensors' noise on all benches tried
-FIRM = 5.0  # times the oil's natural frequency: a contact in which the supply leaves 1e-4 of the stroke at most
-YIELDS = 1e-4  # of the stroke
+YIELDS = {"hydraulic": 1e-5, "mechanical": 1e-4}  # of the stroke, by the full force: less than sensors of such see
 HEAVY = 1e6
 _OF_FORCES = ("moving_mass", "drive_force", "bristle_length", "bristle_time")  # base parameters of forces alone
 _READINGS = 4  # of the outputs, the first: what sensors read
@@ -82,15 +81,16 @@ class Plant:
     def for_fits(cls, model: Model) -> Plant:
         """The plant of a model with steps as long as do where sensors' noise hides the integrator's error.
 
-        End stops that are far stiffer than the oil would ask for short steps everywhere, and are softer.
+        End stops so stiff that no sensor sees them yield would ask for short steps everywhere, and are softer.
         """
         key = "end_stop.stiffness"
         if not model.entry(key).free:
             values = {k: model.value(k) for k in model.keys()}  # noqa: SIM118, a method of the model
             if model.kind == "hydraulic":
-                enough = values["moving_mass"] * (FIRM * rates.oil(values)) ** 2
-            else:  # the full force goes as deep as the supply does there
-                enough = abs(values["drive_force"] * values["drive_limit"]) / (YIELDS * values["stroke"])
+                force = values["supply_pressure"] * max(values["piston_area_a"], values["piston_area_b"])
+            else:
+                force = abs(values["drive_force"] * values["drive_limit"])
+            enough = force / (YIELDS[model.kind] * values["stroke"])
             if values[key] > enough >= model.parameter(key).bounds[0]:
                 model = model.with_values({key: enough})
         return cls(model, FIT_STEP, FIT_REFINEMENT)

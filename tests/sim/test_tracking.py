@@ -93,6 +93,10 @@ def test_a_stop_far_stiffer_than_the_oil_asks_for_no_short_steps_in_fits(bench: 
     assert Plant.for_fits(bench).value("end_stop.stiffness") == bench.value("end_stop.stiffness")
     free = light.with_entry("end_stop.stiffness", free=True)
     assert Plant.for_fits(free).value("end_stop.stiffness") == light.value("end_stop.stiffness")
+    # Driven against it, the piston goes no deeper than a position sensor sees.
+    drive, start = np.full(100, 8.0), fit.initial_state(position=0.755)
+    soft, hard = (p.simulate(drive, 1e-3, start).position[-1] for p in (fit, exact))
+    assert 0.0 < hard - 0.762 < soft - 0.762 < 1e-5 * light.value("stroke")
 
 
 def test_a_held_plant_goes_the_same_path_whatever_its_forces(bench: Model) -> None:

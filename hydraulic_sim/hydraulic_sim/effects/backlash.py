@@ -3,8 +3,8 @@
     F = m·(ω²·c + 2·ζ·ω·ḋ·r(c)) while in contact, never pulling back through the gap;   d̈ = −F/m − a
 
 d: how far the load is ahead of the rod; c = d ∓ g/2 beyond the gap g, 0 within it; ω = 2π·f of the contact. Damping
-grows over the first 0.05 mm (r), so that contact is continuous. The mass m comes on top of moving_mass; without it
-(m = 0) nothing is felt.
+grows over the first twentieth of the gap (r), so that contact is continuous. The mass m comes on top of moving_mass;
+without it (m = 0) nothing is felt.
 
 Source: Nordin & Gutman (2002), Automatica 38(10), dead-zone model of backlash; Hunt & Crossley (1975), J. Applied
 Mechanics 42, for damping that vanishes at first touch.
@@ -16,7 +16,7 @@ from numba import njit
 
 from hydraulic_sim.effect import Effect, Parameter, State
 
-TOUCH = 5e-5  # m of contact over which damping grows
+TOUCH = 0.05  # of the gap: depth of contact over which damping grows
 
 
 @njit(error_model="numpy")
@@ -27,7 +27,8 @@ def contact(lead, lead_rate, gap, frequency, damping):
     if depth <= 0.0:
         return 0.0
     side = 1.0 if lead > 0.0 else -1.0
-    grown = min(depth / TOUCH, 1.0)
+    touch = TOUCH * gap
+    grown = depth / touch if depth < touch else 1.0
     return side * max(w * w * depth + 2.0 * damping * w * grown * side * lead_rate, 0.0)
 
 

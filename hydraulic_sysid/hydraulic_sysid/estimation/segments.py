@@ -39,8 +39,8 @@ _FEWEST = 20  # samples of a segment
 _SMOOTHING = 15  # samples of the quadratic through which initial values are read
 STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
 _TURNING = 0.005  # s: over twice that the acceleration of a piston that hardly moves is read
-# Of the noise: how far an initial state may be off what was measured there. Sensors with an offset or a wrong scale are
-# off by far more than their noise, and the samples of the segment hold the initial state anyway.
+# Of the noise: how far what a sensor reads in an initial state may be off what was measured there. The samples of the
+# segment hold the initial state anyway.
 _PRIOR = {"position": 1000.0, "pressure_a": 200.0, "pressure_b": 200.0}
 # Of the supply pressure: how far a pressure without a sensor may be off what motion and valve say …
 _UNMEASURED_PRESSURE = 0.2  # … before the piston has moved, when nothing has said anything yet, …
@@ -159,6 +159,22 @@ class Segments:
                 white[row] -= np.tensordot(basis, np.tensordot(basis, white[row], axes=(0, 0)), axes=(1, 0))
             found.append(white / self.loudness[:, c].reshape((-1,) + (1,) * (white.ndim - 1)))
         return np.stack(found, axis=2).reshape(len(values), -1, *values.shape[3:])
+
+    @cached_property
+    def starts_of_filters(self) -> Array:
+        """(S, samples·C, L) whitened: what a low pass still holds, in each segment, of what came before it.
+
+        One column per channel behind one; its size is what is not known of the initial state that is read there.
+        """
+        lagged = [c for c, reading in enumerate(self.readings) if reading.lag > 0.0]
+        if not lagged:
+            return self.nuisance[..., :0]
+        found = np.zeros((*self.measured.shape, len(lagged)))
+        for column, c in enumerate(lagged):
+            fading = np.exp(-self.record.dt / self.readings[c].lag * np.arange(self.samples))
+            place = list(self.free).index(_STATES.index(self.channels[c]))
+            found[:, :, c, column] = self.prior_std[:, place, None] * fading
+        return self.whitened(found)
 
     def initial_states(self, plant: Plant) -> Array:
         """Where a plant's states begin (S, n_states): as measured, the rest at ease.

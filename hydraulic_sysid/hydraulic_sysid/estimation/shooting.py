@@ -175,7 +175,10 @@ class Shooting:
     def _residual(self, plant: Plant, i: int, states: Array, inner: Inner | None = None) -> Array:
         segments = self.segments[i]
         run = self._run(plant, i, states, inner)
-        off = (self.initial_states[i] - states)[:, segments.free] / segments.prior_std
+        # A sensor's offset or scale is no error of the state: what it reads is compared, not what is.
+        seen = states.copy()
+        seen[:, [plant.state_names.index(c) for c in segments.channels]] = run[:, 0]
+        off = (self.initial_states[i] - seen)[:, segments.free] / segments.prior_std
         if segments.tracked:
             off = np.where(segments.unmeasured_pressures, self.misfit / self.plant.value("supply_pressure") * off, off)
         return segments.deviation(run, off)
@@ -243,7 +246,8 @@ class Shooting:
             moved = states.copy()
             moved[:, index] += step
             jacobian[..., place] = (self._residual(plant, i, moved, inner) - base) / step
-        nuisance = np.pad(segments.nuisance, ((0, 0), (0, len(segments.free)), (0, 0)))
+        nuisance = np.concatenate((segments.nuisance, segments.starts_of_filters), axis=-1)
+        nuisance = np.pad(nuisance, ((0, 0), (0, len(segments.free)), (0, 0)))
         return Projection.of(base, jacobian, nuisance)
 
 

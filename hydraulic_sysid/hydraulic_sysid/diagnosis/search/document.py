@@ -91,6 +91,7 @@ def document(
             for name, every in verdict.competing.items()
         },
         "data_sheet": [_number(result, d) for d in result.moved],
+        "data_sheet_instead": [_number(result, d) for d in result.numbers_instead],
         "recording": {
             "faults": [_fault(f) for f in result.faults],
             "instead": [_fault(f) for f in result.faults_instead],

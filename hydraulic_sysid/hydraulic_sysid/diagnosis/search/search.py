@@ -264,15 +264,16 @@ class Search:
             enough = RIVAL * (base.misfit.fit - best)
             named = [f for f in faults if not base.misfit.little or f.unusual(self.split.interval)]
             self.rivals = [f for f in named if not f.linear and f.reduction >= enough][:FULL]
-            if not faults or base.misfit.fit - faults[0].reduction > best - base.misfit.least:
-                break
             # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
+            least = base.misfit.fit - best - base.misfit.least
+            if not faults or faults[0].reduction < (1.0 if faults[0].linear else PROMISED) * least:
+                break
             near = [f for f in faults if not f.linear and f.reduction >= NEAR * faults[0].reduction][:FULL]
             near = faults[:1] if faults[0].linear else near
             found = min((self.with_fault(base, f) for f in near), key=lambda f: f.misfit.total)
             if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
-            if leaves_most(base.misfit, found.misfit):
+            if leaves_most(base.misfit, found.misfit) or base.misfit.fit - found.misfit.fit < least:
                 break
             # Filters of sound transducers delay by a part of a sampling interval, too: that is known, but not named.
             if not base.misfit.little or found.fault.unusual(self.split.interval):
@@ -346,7 +347,10 @@ class Search:
         strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
         done, moved = self.fewest_moved(final, strict if final is base else None)
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
-            places = [self.in_place_of(strict, done, d, moved) for d in moved]
+            simpler = self.simpler(found, strict, done, moved)
+            if simpler is not None:
+                return simpler
+            places = [self.in_place_of(strict, done, [d], moved) for d in moved]
             every = [(state, i) for i, (_, states) in enumerate(places) for state in states]
             best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
             clear = CLEAR * least_cost(done.misfit.count, done.misfit.variance)
@@ -365,6 +369,23 @@ class Search:
         if misfits:
             misfits = {**misfits, next(reversed(misfits)): done.misfit}
         return replace(found, base=strict, final=done, misfits=misfits, moved=tuple(moved))
+
+    def simpler(
+        self, found: SearchResult, strict: SearchState, done: SearchState, moved: Sequence[Deviation]
+    ) -> SearchResult | None:
+        """With the one effect that explains what takes several numbers of the data sheet, as BIC has it."""
+        if len(moved) < 2:
+            return None
+        without, states = self.in_place_of(strict, done, moved, moved)
+        best = min(states, key=lambda s: s.misfit.total, default=done)
+        spared = (len(moved) - 1) * np.log(done.misfit.count) * done.misfit.variance
+        if best is done or best.misfit.total - done.misfit.total > spared:
+            return None
+        name = _new(best, strict)
+        return replace(
+            found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without},
+            numbers_instead=tuple(moved),
+        )  # fmt: skip
 
     def fewest_moved(self, final: SearchState, strict: SearchState | None) -> tuple[SearchState, list[Deviation]]:
         """The state in which as few numbers of the data sheet move as explain what all of them do, and these numbers.
@@ -439,13 +460,13 @@ class Search:
         return None if _worse(tried.state.misfit, found.final.misfit) else tried
 
     def in_place_of(
-        self, strict: SearchState, done: SearchState, deviation: Deviation, moved: Sequence[Deviation]
+        self, strict: SearchState, done: SearchState, taken: Sequence[Deviation], moved: Sequence[Deviation]
     ) -> tuple[SearchState, list[SearchState]]:
-        """The state without another value of a number, and with effects that explain no less than it does.
+        """The state with numbers ``taken`` back, and with effects that explain no less than they do.
 
         ``strict``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
         """
-        others = [d.key for d in moved if d.key != deviation.key]
+        others = [d.key for d in moved if d not in taken]
         without = self.explore(self.with_moved(done, others) if others else strict, LATER_REFITS)
         promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
         found = []

@@ -69,7 +69,8 @@ class SearchResult:
 
     ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
     ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the state
-    before any fault of the recording was assumed; ``faults_instead``: that explain what the one effect added does.
+    before any fault of the recording was assumed; ``faults_instead`` and ``numbers_instead``: that explain what the one
+    effect added does, the latter only together.
     """
 
     model: Model
@@ -82,6 +83,7 @@ class SearchResult:
     moved: Sequence[Deviation] = ()
     faults: Sequence[RecordingFault] = ()
     faults_instead: Sequence[RecordingFault] = ()
+    numbers_instead: Sequence[Deviation] = ()
     as_recorded: SearchState | None = None
     stopped: bool = False
     """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""

@@ -197,7 +197,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > UNEXPLAINED:
         beside.append(remainder_sentence(result.remainders))
     if verdict.kind == MISSING:
-        return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict), *beside])
+        return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict), *_numbers(result), *beside])
     if verdict.kind == INDISTINGUISHABLE:
         parts = []
         for name in result.added:
@@ -346,6 +346,11 @@ def warning(named: Sequence[str], imitations: Sequence[str]) -> str:
 def _instead(verdict: Verdict) -> list[str]:
     best = {name: verdict.competing[name][0] for name in verdict.added if verdict.competing.get(name)}
     return [f"{c.name} instead of {name} leaves {c.misfit.rms_validation:.3g} × noise." for name, c in best.items()]
+
+
+def _numbers(result: SearchResult) -> list[str]:
+    found = result.numbers_instead
+    return [f"Together, {_and([d.key for d in found])} would explain as much: check them."] if found else []
 
 
 def _and(words: Sequence[str]) -> str:
