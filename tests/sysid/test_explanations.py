@@ -160,6 +160,20 @@ def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> Non
     assert_cannot_inject(found)
 
 
+def test_slow_transducers_are_a_matter_of_the_recording(model: Model, runs) -> None:
+    """They ring on from one segment into the next."""
+    lag = 0.01
+    kept = np.exp(-DT / lag)
+    pole = [1.0 - (1.0 - kept) * lag / DT, (1.0 - kept) * lag / DT - kept], [1.0, -kept]  # of straight lines
+    slow = [{c: lfilter(*pole, v - v[0]) + v[0] if c.startswith("pressure") else v for c, v in run.items()}
+            for run in runs]  # fmt: skip
+    found = document(diagnose(model, records(slow)))
+    assert found["verdict"]["kind"] == "recording", found["verdict"]["text"]
+    (fault,) = found["recording"]["faults"]
+    assert fault["name"] == "pressures_low_pass" and fault["size"] == pytest.approx(lag, rel=0.03)
+    assert found["residual"]["after"]["validation"] < 1.03
+
+
 def test_a_transducer_that_reads_too_much_is_a_matter_of_the_recording(model: Model, runs) -> None:
     scaled = [{**run, "pressure_b": 1.03 * run["pressure_b"]} for run in runs]
     found = document(diagnose(model, records(scaled)))
