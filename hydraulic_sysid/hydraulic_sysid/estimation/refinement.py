@@ -17,7 +17,6 @@ from . import noise_model
 from .covariance import inverse
 from .fit import FitPoint
 from .noise_model import ChannelNoise
-from .recording import Reading
 from .segments import Segments
 
 LATE = 0.35  # sampling intervals by which a channel may be late without being named
@@ -72,7 +71,7 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
         off = _raw_columns(s, columns[i], shares)
         hum = _hum(s, [lines[c] for c in s.channels], [noise[c].std for c in s.channels])
         judged = judged.with_noise([noise[c] for c in s.channels])
-        raw = np.concatenate((off, hum, _filter_states(s, readings), s.disturbance), axis=-1)
+        raw = np.concatenate((off, hum, s.disturbance), axis=-1)
         found.append(replace(judged, nuisance=judged.whitened(raw)))
     return found
 
@@ -155,19 +154,6 @@ def _waves(segments: Segments, lines: Sequence[float]) -> Array:
     time = (segments.first[:, None] + np.arange(segments.samples)) * segments.record.dt
     angle = 2.0 * np.pi * time[..., None] * np.array(lines)
     return np.concatenate((np.sin(angle), np.cos(angle)), axis=-1)
-
-
-def _filter_states(segments: Segments, readings: Sequence[Reading]) -> Array:
-    """What a low pass remembers of before a segment (S, samples, C, K): it fades, as large as a channel may move."""
-    time = np.arange(segments.samples) * segments.record.dt
-    found = [np.zeros((*segments.measured.shape, 0))]
-    for c, one in enumerate(readings):
-        if one.lag > 0.0:
-            rate = float(np.std(np.gradient(segments.smoothed[:, segments.states[c]], segments.record.dt)))
-            column = np.zeros((*segments.measured.shape, 1))
-            column[:, :, c, 0] = one.lag * rate * np.exp(-time / one.lag)
-            found.append(column)
-    return np.concatenate(found, axis=-1)
 
 
 def _without(residual: Array, lines: Sequence[float], segments: Segments) -> Array:

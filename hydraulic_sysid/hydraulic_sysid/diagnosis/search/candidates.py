@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from hydraulic_sim import slots
@@ -78,10 +78,16 @@ def observed(effect: Effect) -> bool:
     return any(p.observed for p in effect.parameters)
 
 
-def delays(effect: Effect) -> bool:
-    """Whether all that the effect brings is time: the plant or a sensor acts later."""
+def delays(effect: Effect, values: Callable[[str], float], interval: float) -> bool:
+    """Whether an effect with these values [SI, by key] only makes something act later by less than a sampling interval.
+
+    That is a time below it, a resonance beyond half the sampling rate, a full travel that takes no longer.
+    """
+    takes = {"s": lambda value: value, "Hz": lambda value: 0.5 / value, "1/s": lambda value: 1.0 / value}
     brought = [p for p in effect.parameters if p.null is not None and p.free]
-    return bool(brought) and all(p.unit == "s" for p in brought)
+    return bool(brought) and all(
+        p.unit in takes and takes[p.unit](values(f"{effect.name}.{p.name}")) < interval for p in brought
+    )
 
 
 def probes(effect: Effect, features: RecordFeatures, sizes: Sequence[float] = SIZES) -> Iterator[list[Probe]]:

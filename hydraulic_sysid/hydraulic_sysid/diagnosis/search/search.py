@@ -52,6 +52,7 @@ from .set_aside import accidents
 from .spectral_lines import record_features
 from .uncertainty import parameter_errors
 from .worth import (
+    EXPLAINED,
     FAR,
     FURTHER,
     MOSTLY,
@@ -85,14 +86,14 @@ BEYOND = 8  # values of a number that lay at its bound, over all where it may go
 SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one
 CLEAR = 10.0  # times what names a number, beyond which a fit need not show what putting it back costs
 QUIETER = 0.95  # of the noise before: what was judged by that is judged again
-RETIMED = 0.1  # sampling intervals by which a channel is less late than before: the same
+RETIMED = 0.03  # sampling intervals by which a channel is less late than before: the same
 MOST_FAULTS = 3  # of the recording
 UNNOTICED = 0.003  # of the motion in a segment: what leaves less is no disturbance of the drive
 MOST_SIZES = 4  # times that the size of a fault is sought again, …
 SAME_SIZE = 0.03  # … until it changes by no more than this share
 RIVAL = 0.8  # of what the best candidate explains, from which a fault of the recording may be in its place
 FAR_OFF = 4.0  # mean square over noise from which a fit need not be finished
-ROUNDS = 2  # of estimating the noise and fitting again
+ROUNDS = 6  # of estimating noise and delays and fitting again, at most
 MOST_SWAPS = 3
 PROMISED = 0.5  # of what an effect must explain, or of what a number explains, which must show for a fit to its end
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
@@ -190,12 +191,12 @@ class Search:
     def nearer(self, model: Model, far: bool) -> SearchState:
         """A model fitted: where it is ``far`` off, to the end only if it comes near.
 
-        A resonance has many local minima. From far off the fit begins once more from where short segments lead: over
-        few periods a wrong frequency is hardly a wrong phase.
+        A resonance has many local minima. What leaves more than a little begins once more from where short segments
+        lead: over few periods a wrong frequency is hardly a wrong phase.
         """
-        if not far:
-            return self.state(model, self._last)
-        found = self.state(model, self._first)
+        found = self.state(model, self._first if far else self._last)
+        if found.misfit.variance - 1.0 < EXPLAINED:
+            return found
         try:
             short = self.state(self.fitted_to_short_segments(model), self._first)
         except SimulationError:  # they lead where the plant does not run
@@ -303,9 +304,7 @@ class Search:
 
     def within_a_sample(self, tried: CandidateRefit) -> bool:
         """Whether an effect only delays, by less than a sampling interval: sound sensors and loggers do so, too."""
-        effect, model = self.given.library[tried.name], tried.refit.model
-        sizes = (model.value(f"{effect.name}.{p.name}") for p in effect.parameters)
-        return delays(effect) and all(size < self.split.interval for size in sizes)
+        return delays(self.given.library[tried.name], tried.refit.model.value, self.split.interval)
 
     def rounded(self, base: SearchState) -> SearchState:
         """A state with refits of the effects whose size records show by themselves.
@@ -374,12 +373,12 @@ class Search:
         self, found: SearchResult, strict: SearchState, done: SearchState, moved: Sequence[Deviation]
     ) -> SearchResult | None:
         """With the one effect that explains what takes several numbers of the data sheet, as BIC has it."""
-        if len(moved) < 2:
+        if len(moved) < 2 or not _worse(strict.misfit, done.misfit):
             return None
         without, states = self.in_place_of(strict, done, moved, moved)
         best = min(states, key=lambda s: s.misfit.total, default=done)
         spared = (len(moved) - 1) * np.log(done.misfit.count) * done.misfit.variance
-        if best is done or best.misfit.total - done.misfit.total > spared:
+        if best is done or best.misfit.total - done.misfit.total > spared or not self.better(strict, best):
             return None
         name = _new(best, strict)
         return replace(
