@@ -52,5 +52,7 @@ def test_a_load_that_the_file_does_not_know_is_found_beyond_its_bound(model: Mod
     looked = search(model, model.with_values({"moving_mass": heavy}), steps=True)
     assert model.entry("moving_mass").bounds[1] < 0.7 * heavy
     base = looked.begin()
-    assert base.model.value("moving_mass") == pytest.approx(heavy, rel=0.03)
+    # While the areas may move, too, records hold what forces and flows are to each other.
+    area = base.model.value("piston_area_a") / model.value("piston_area_a")
+    assert base.model.value("moving_mass") == pytest.approx(area * heavy, rel=0.01)
     assert base.misfit.little
