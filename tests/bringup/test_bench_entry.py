@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from hydraulic_bringup.entry.checkout import Checkout
 from hydraulic_bringup.entry.environment import command_variables
 from hydraulic_bringup.entry.environment_plan import STAMP, Stamp, wanted
 from hydraulic_bringup.entry.ros import Ros
+from hydraulic_bringup.entry.verbs import test as test_verb
 
 ROOT = Path(__file__).resolve().parents[2]
 ENTRY = Path("ros_ws/src/hydraulic_bringup/hydraulic_bringup")
@@ -439,6 +441,23 @@ def test_what_protects_the_bench_is_not_among_them() -> None:
         "workbench/test_workbench_node.py",  # milliseconds from the stop button to 0 V
     }
     assert not re.search(r"rerun|flaky|repeat", (ROOT / "pyproject.toml").read_text().partition("[tool.")[0])
+
+
+@pytest.mark.parametrize("deaf", [False, True])
+def test_what_hangs_is_interrupted_and_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], deaf: bool
+) -> None:
+    """What it has found is told; a child that it leaves behind keeps nobody waiting."""
+    monkeypatch.setattr(test_verb, "LONGEST_S", 1.0)
+    monkeypatch.setattr(test_verb, "INTERRUPT_S", 1.0 if deaf else PATIENCE_S)
+    trap = "''" if deaf else "'echo === 2 failed in 1 s ===; exit 2'"
+    hung = f"trap {trap} INT; echo test_seal.py F; sleep 60 & while true; do sleep 0.1; done"
+    begun = time.monotonic()
+    run = test_verb.Pytest(["sh", "-c", hung], tmp_path, dict(os.environ))
+    assert run.code == (-signal.SIGKILL if deaf else 2)
+    assert "test_seal.py F" in capfd.readouterr().out
+    assert test_verb.summed([run.counted], 1.0).startswith("=== 1 errors" if deaf else "=== 2 failed")
+    assert time.monotonic() - begun < 30.0, "it waited for the child"
 
 
 @pytest.mark.parametrize("marker", ["not timing", "timing"])

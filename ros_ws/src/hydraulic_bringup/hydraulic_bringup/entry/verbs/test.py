@@ -10,11 +10,13 @@ from __future__ import annotations
 import codecs
 import os
 import re
+import select
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -26,6 +28,7 @@ ORDER = 2
 CHECKS = ("ruff", "check", "."), ("mypy",)
 COMPILE = "from hydraulic_sim import model_file, plant; plant.Plant(model_file.load_model('sample_bench'))"
 FAILED_TESTS = 1  # pytest's exit code; others mean that it was not able to run them
+LONGEST_S = 2400.0  # about three times what two processors take; what hangs beyond it is interrupted and has failed
 INTERRUPT_S = 15.0  # for pytest to end its node processes and to sum up
 COUNT = re.compile(r"(\d+) (passed|failed|errors?|skipped|xfailed|xpassed|repeated|warnings?)\b")
 
@@ -94,17 +97,17 @@ class Pytest:
         process = subprocess.Popen(
             [*command, *colour], cwd=folder, env={**variables, **size}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
         )
+        bound = threading.Timer(LONGEST_S, self._end, [process])
+        bound.daemon = True
+        bound.start()
         try:
             self.closing = self._show(process)
             self.code = process.wait()
         except BaseException:  # whoever waits for it may be interrupted
-            if not sys.stdout.isatty():  # on a terminal Ctrl-C reached it as well
-                process.send_signal(signal.SIGINT)
-            try:
-                process.wait(INTERRUPT_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
+            self._end(process, interrupt=not sys.stdout.isatty())  # on a terminal Ctrl-C reached it as well
             raise
+        finally:
+            bound.cancel()
 
     @property
     def counted(self) -> str:
@@ -112,11 +115,27 @@ class Pytest:
         return re.sub(r"\b(\d+) (failed|errors?)\b", r"\1 repeated", self.closing) if self.repeated else self.closing
 
     @staticmethod
+    def _end(process: subprocess.Popen[bytes], interrupt: bool = True) -> None:
+        """Let it sum up what it has; end it where it does not."""
+        if interrupt:
+            process.send_signal(signal.SIGINT)
+        try:
+            process.wait(INTERRUPT_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+
+    @staticmethod
     def _show(process: subprocess.Popen[bytes]) -> str:
         assert process.stdout is not None
         decoder = codecs.getincrementaldecoder("utf-8")("replace")
         tail = ""
-        while data := os.read(process.stdout.fileno(), 65536):
+        while True:
+            if not select.select([process.stdout], [], [], 1.0)[0]:
+                if process.poll() is not None:  # what it started and did not end may hold the pipe open
+                    break
+                continue
+            if not (data := os.read(process.stdout.fileno(), 65536)):
+                break
             text = decoder.decode(data)
             sys.stdout.write(text)
             sys.stdout.flush()
