@@ -151,6 +151,17 @@ def wait_until_fixture() -> Callable[..., Any]:
     return _wait_until
 
 
+@pytest.fixture(autouse=True)
+def ordinary_scheduling() -> Iterator[None]:
+    """A test that leaves real-time scheduling behind fails: all that later tests start would inherit it."""
+    if not hasattr(os, "sched_getscheduler"):
+        yield
+        return
+    before = os.sched_getscheduler(0)
+    yield
+    assert os.sched_getscheduler(0) == before, "this test has left its process real-time scheduling"
+
+
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """A ROS domain of this test's own, on this machine only, in the environment of it and of its children."""

@@ -95,6 +95,8 @@ def test_a_node_may_do_all_that_it_does(policy: dict[str, Any], name: str, tmp_p
         for what, names in does.items():
             assert names <= policy[name][what], what
         assert does["publish"] and does["reply"]
+        if isinstance(node, Recorder):
+            node.close("the test has ended")
         node.destroy_node()
     finally:
         rclpy.try_shutdown()

@@ -23,7 +23,7 @@ from hydraulic_node_utils.nodes.callbacks import trigger, understood
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.serving import ServedNode, serve
 from hydraulic_node_utils.parameter_spec import ParameterSpec
-from hydraulic_node_utils.scheduling import request_realtime_for_all
+from hydraulic_node_utils.scheduling import release_realtime_for_all, request_realtime_for_all
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.linear.models import ArxOrder
 from hydraulic_sysid.linear.online import LiveModel, RecentRms, RunningArx
@@ -81,6 +81,11 @@ class Estimator(ServedNode):
         self._residual = RecentRms(round(RESIDUAL_S / HEALTH_S))
         if values["realtime_priority"]:  # what cannot keep up makes the plant send everything twice
             request_realtime_for_all(values["realtime_priority"])
+
+    def destroy_node(self) -> None:
+        """Give back what goes before ordinary processes, too: the process may go on."""
+        release_realtime_for_all()
+        super().destroy_node()
 
     def _apply(self, name: str, value: Any) -> None:
         if name == "forgetting":

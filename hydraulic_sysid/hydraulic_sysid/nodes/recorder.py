@@ -26,7 +26,7 @@ from hydraulic_node_utils.nodes import command_line
 from hydraulic_node_utils.nodes.parameters import ParameterTable
 from hydraulic_node_utils.nodes.taking_down import take_down
 from hydraulic_node_utils.parameter_spec import ParameterSpec
-from hydraulic_node_utils.scheduling import request_realtime_for_all
+from hydraulic_node_utils.scheduling import release_realtime_for_all, request_realtime_for_all
 from hydraulic_sysid.data.bag import Recording, StopRule
 from hydraulic_sysid.nodes._recorder_health import RecorderHealth
 from hydraulic_sysid.nodes._recorder_intake import Intake
@@ -101,6 +101,11 @@ class Recorder(Node):
             figures = {"messages": bag.messages, "duration_s": bag.duration_ns * 1e-9, "bytes": bag.size}
             self._tell("closed", reason=reason, missing=missing, **figures)
             self.get_logger().info(f"closed {folder}: {sum(bag.messages.values())} messages ({reason})")
+
+    def destroy_node(self) -> None:
+        """Give back what goes before ordinary processes, too: the process may go on."""
+        release_realtime_for_all()
+        super().destroy_node()
 
     def _is_due(self, period: float) -> bool:
         if due := time.monotonic() >= self._due[period]:
