@@ -22,6 +22,7 @@ from typing import Any
 from rich.console import Console
 
 from hydraulic_node_utils import cli, tables
+from hydraulic_node_utils.interrupts import finishing
 from hydraulic_node_utils.large_arrays import give_back
 from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data import results
@@ -81,13 +82,14 @@ def run(
         with Console(stderr=True).status(f"{verb} …") as status:
             say = tell_programs if options.progress else lambda text: status.update(f"{text} …")
             done = work(options, say)
-            say("writing the report")
-            results.write_result(folder, done.result)
-            for name, write in done.files.items():
-                write(folder / name)
-            from hydraulic_sysid.report import write_page  # takes long to import, and --help needs none
+            with finishing():
+                say("writing the report")
+                results.write_result(folder, done.result)
+                for name, write in done.files.items():
+                    write(folder / name)
+                from hydraulic_sysid.report import write_page  # takes long to import, and --help needs none
 
-            page = write_page(folder, results.read_folder(folder))
+                page = write_page(folder, results.read_folder(folder))
         if options.json:
             slim = _without(results.plain(done.result), bulky)
             print(json.dumps(slim, indent=2, ensure_ascii=False, allow_nan=False))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
+from hydraulic_node_utils.interrupts import finishing
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
@@ -98,33 +99,34 @@ def diagnose(
     say("the records against the model file")
     checked = contradictions(model, [*records, *validation])
     found = verdicts.conclusive(search.run())
-    verdict = verdicts.judge(found)
-    outside = verdict.kind == verdicts.OUTSIDE
-    # Where most is left, what was added is a proxy for something else, and bends curves and balances.
-    proxy = explained(found.base.misfit, found.final.misfit) < HOPELESS
-    suspect = found.base if proxy else found.final
-    curves: list[NonparametricCurve] = []
-    if outside:
-        curves = nonparametric_curves(suspect.linearisation, say)
-        verdict = verdicts.reviewed(verdict, found, curves)
+    with finishing():
+        verdict = verdicts.judge(found)
         outside = verdict.kind == verdicts.OUTSIDE
-        curves = curves if outside else []
-    beside = () if suspect is found.base else tuple(found.added)
-    remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
-    known = parameter_errors(found.final.linearisation)
-    whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
-    done = as_filed(finished(found, known), model)
-    competing = {name: as_filed(other, model) for name, other in verdicts.alternatives(found, verdict).items()}
-    tied = [name for name in verdict.added if verdict.indistinguishable_from(name)]
-    if verdict.kind == verdicts.INDISTINGUISHABLE and tied:
-        competing["+".join(tied)] = done
-    before, after = found.base.model, found.final.model if found.added or found.moved else None
-    suspected = None if not outside else before if proxy else after
-    del found, suspect  # their sensitivities would take up the memory that the balances need
-    say("balances")
-    rows, where = _balances(before, records, before is suspected)
-    rows_after, where_after = _balances(after, records, after is suspected) if after else ([], [])
-    return Diagnosis(done, competing, with_balances(whole, rows, rows_after, where or where_after), remaining)
+        # Where most is left, what was added is a proxy for something else, and bends curves and balances.
+        proxy = explained(found.base.misfit, found.final.misfit) < HOPELESS
+        suspect = found.base if proxy else found.final
+        curves: list[NonparametricCurve] = []
+        if outside:
+            curves = nonparametric_curves(suspect.linearisation, say)
+            verdict = verdicts.reviewed(verdict, found, curves)
+            outside = verdict.kind == verdicts.OUTSIDE
+            curves = curves if outside else []
+        beside = () if suspect is found.base else tuple(found.added)
+        remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
+        known = parameter_errors(found.final.linearisation)
+        whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
+        done = as_filed(finished(found, known), model)
+        competing = {name: as_filed(other, model) for name, other in verdicts.alternatives(found, verdict).items()}
+        tied = [name for name in verdict.added if verdict.indistinguishable_from(name)]
+        if verdict.kind == verdicts.INDISTINGUISHABLE and tied:
+            competing["+".join(tied)] = done
+        before, after = found.base.model, found.final.model if found.added or found.moved else None
+        suspected = None if not outside else before if proxy else after
+        del found, suspect  # their sensitivities would take up the memory that the balances need
+        say("balances")
+        rows, where = _balances(before, records, before is suspected)
+        rows_after, where_after = _balances(after, records, after is suspected) if after else ([], [])
+        return Diagnosis(done, competing, with_balances(whole, rows, rows_after, where or where_after), remaining)
 
 
 def finished(found: SearchResult, known: Mapping[str, Known]) -> Model:
