@@ -460,6 +460,16 @@ def test_what_hangs_is_interrupted_and_has_failed(
     assert time.monotonic() - begun < 30.0, "it waited for the child"
 
 
+def test_tests_that_somebody_asks_for_may_take_as_long_as_they_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A debugger stands still for an hour."""
+    monkeypatch.setattr(test_verb, "LONGEST_S", 0.2)
+    slow = ["sh", "-c", "sleep 1.5; echo === 1 passed in 1.5 s ==="]
+    assert test_verb.Pytest(slow, tmp_path, dict(os.environ), longest=60.0).code == 0
+    assert test_verb.Pytest(slow, tmp_path, dict(os.environ)).code != 0
+
+
 @pytest.mark.parametrize("marker", ["not timing", "timing"])
 def test_whichever_run_fails_fails_the_test(built: FakeCheckout, marker: str) -> None:
     leaks = built.bench("test", LEAKS=marker)

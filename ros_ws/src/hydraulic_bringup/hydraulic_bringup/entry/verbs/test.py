@@ -43,7 +43,7 @@ def run(bench: Bench, arguments: list[str]) -> int:
     python = [str(bench.checkout.python), "-m"]
     if arguments:
         here = Path.cwd() if root in Path.cwd().parents else root  # so that given paths mean what they say
-        return Pytest([*python, "pytest", *arguments], here, variables).code
+        return Pytest([*python, "pytest", *arguments], here, variables, longest=threading.TIMEOUT_MAX).code
     failed = []
     # Once, and beside the checks: else each of the workers would begin with it. The tests say what is wrong with it.
     with subprocess.Popen([python[0], "-c", COMPILE], cwd=root, env=variables):
@@ -89,7 +89,9 @@ def summed(closings: Sequence[str], seconds: float) -> str:
 class Pytest:
     """A run of pytest, shown as it goes and ended; `code` and `closing`, its last line, are what it left."""
 
-    def __init__(self, command: Sequence[str], folder: Path, variables: Mapping[str, str]) -> None:
+    def __init__(
+        self, command: Sequence[str], folder: Path, variables: Mapping[str, str], longest: float | None = None
+    ) -> None:
         self.repeated = False  # its failures have been run again
         print(f"== {' '.join(command[2:])}", flush=True)
         size = {"COLUMNS": str(shutil.get_terminal_size().columns)}
@@ -97,7 +99,7 @@ class Pytest:
         process = subprocess.Popen(
             [*command, *colour], cwd=folder, env={**variables, **size}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
         )
-        bound = threading.Timer(LONGEST_S, self._end, [process])
+        bound = threading.Timer(LONGEST_S if longest is None else longest, self._end, [process])
         bound.daemon = True
         bound.start()
         try:
