@@ -136,14 +136,15 @@ def _multiplied(line: str, factor: float) -> str:
     return re.sub(r"[\d.]+(e[+-]?\d+)?(?= )", lambda number: f"{factor * float(number[0]):.6g}", line)
 
 
-def run(task: tuple[Row, int]) -> dict[str, Any]:
-    """One row, diagnosed."""
+def run(task: tuple[int, int]) -> dict[str, Any]:
+    """The row of this number (its changes are functions that no other process can be sent), diagnosed."""
     from hydraulic_sim.model_file import load_model
     from hydraulic_sysid.data.records import read_all
     from hydraulic_sysid.data.results import plain
     from hydraulic_sysid.diagnosis.search import diagnose
 
-    row, seed = task
+    number, seed = task
+    row = ROWS[number]
     bench = benches.Bench("none", seed=seed, setting=Setting(row.geometry, row.sensors, "closed", "right"))
     tables = row.change(benches.make(bench, noise=row.noise), bench.rng(row.title))
     with tempfile.TemporaryDirectory() as scratch:
@@ -171,7 +172,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seed", nargs="+", type=int, default=[1], metavar="S")
     parser.add_argument("--processes", type=int, default=2, metavar="N")
     options = parser.parse_args(argv)
-    rows = [row for row in ROWS if not options.only or any(words in row.title for words in options.only)]
+    rows = [n for n, row in enumerate(ROWS) if not options.only or any(words in row.title for words in options.only)]
     tasks = [(row, seed) for row in rows for seed in options.seed]
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         found = []

@@ -13,6 +13,7 @@ from .holdout import Split
 from .misfit import SMALL, Misfit
 
 NEGLIGIBLE = 0.005  # of the motion in a segment: no law of a library is that of a bench to five parts in a thousand
+NOTHING = 0.001  # of the motion, in every channel: less is nothing to anybody, however little noise the sensors have
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,8 @@ def negligible(found: list[Remainder], share: float = NEGLIGIBLE) -> bool:
 
 
 def immaterial(misfit: Misfit, found: list[Remainder]) -> bool:
-    """Whether what is left is not far off the noise, and nothing to anybody."""
-    return misfit.usual <= SMALL and negligible(found)
+    """Whether what is left is nothing to anybody, and not far off the noise or less than any law is right to."""
+    return negligible(found, NEGLIGIBLE if misfit.usual <= SMALL else NOTHING)
 
 
 def spikes(split: Split) -> list[Spikes]:

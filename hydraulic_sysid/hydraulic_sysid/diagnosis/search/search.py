@@ -250,17 +250,19 @@ class Search:
     def recorded(self, base: SearchState) -> SearchState:
         """A state with its candidates explored, and with every fault of the recording that explains more than they."""
         for tried in range(MOST_FAULTS + 1):
-            if self.nothing_left(base):
-                break
             self.path = [base]
-            base = self.explore(base)
-            left = remainders(self.split, base.residual)
+            nothing = self.nothing_left(base)
+            if not nothing:
+                base = self.explore(base)
             if tried == MOST_FAULTS:
                 break
+            left = remainders(self.split, base.residual)
             self.say("faults of the recording")
             # A disturbance is free enough to take up what laws leave, the reading of a channel is not.
-            disturbances = not negligible(left, UNNOTICED) and not immaterial(base.misfit, left)
+            disturbances = not (nothing or negligible(left, UNNOTICED) or immaterial(base.misfit, left))
             faults = recording_faults(base.linearisation, disturbances)
+            if nothing and not any(self.bends(f, base) for f in faults):
+                break
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
             enough = RIVAL * (base.misfit.fit - best)
             named = [f for f in faults if not base.misfit.little or f.unusual(self.split.interval)]
@@ -294,6 +296,10 @@ class Search:
         self.say("looking for what may pass for noise")
         least = PROMISES * state.misfit.least
         return not any(s.reduction > least and not observed(s.effect) for s in self.scores(state))
+
+    def bends(self, fault: RecordingFault, base: SearchState) -> bool:
+        """Whether a fault is why a model leaves nothing only with small delays of all channels, or at bounds."""
+        return fault.unusual(self.split.interval) and fault.reduction > PROMISES * base.misfit.least
 
     def scores(self, state: SearchState) -> list[CandidateScore]:
         """All candidates on a state, the best first."""

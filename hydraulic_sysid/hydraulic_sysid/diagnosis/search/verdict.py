@@ -18,7 +18,7 @@ from .data_sheet import Deviation
 from .drive_faults import DriveHypothesis
 from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
-from .remainder import Remainder, Spikes, immaterial
+from .remainder import NOTHING, Remainder, Spikes, immaterial
 from .search_state import SearchResult
 from .set_aside import FAR_OFF, SATURATED, SetAside
 from .whiteness import Whiteness
@@ -183,6 +183,11 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
             f"{_and(result.added)} added. {fell}" if result.added else f"no effect added, {final:.3g} × noise left."
         )
         return " ".join([f"Undecided: the search was ended before it was done. Best so far: {reached}", *aside])
+    if verdict.kind == COMPLETE and result.final.misfit.usual > SMALL:
+        return " ".join([
+            f"Complete: these sensors show more than any law is right to (on validation data {final:.3g} × noise).",
+            left, *aside,
+        ])  # fmt: skip
     if verdict.kind == COMPLETE:
         return (
             f"Complete: on validation data the residual is {final:.3g} × noise, and no effect of the library lowers it "
@@ -226,7 +231,8 @@ def remainder_sentence(found: Sequence[Remainder]) -> str:
         return "Nothing remains beyond the noise."
     sizes = _and([f"{quantity(r.beyond, UNITS[r.channel], 2)} of {TITLES[r.channel]}" for r in seen])
     worst = max(r.share for r in seen)
-    return f"What remains beyond the noise is {sizes}, at most {percent(worst)} of the motion in a segment."
+    share = percent(worst) if worst >= NOTHING else "0.1 %"
+    return f"What remains beyond the noise is {sizes}, at most {share} of the motion in a segment."
 
 
 def noise_sentences(result: SearchResult) -> list[str]:
