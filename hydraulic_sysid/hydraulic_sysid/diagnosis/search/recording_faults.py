@@ -110,10 +110,14 @@ class RecordingFault:
         return self.on(at.point.shooting.segments)
 
     def on(self, segments: Sequence[Segments]) -> list[Segments]:
-        """Segments, their channels taken to have it; those of a fault of the drive are as they are."""
+        """Segments, their channels taken to have it; those of a fault of the drive are as they are.
+
+        Small delays without a name, which may have hidden a part of one, are forgotten: noise is judged anew after it.
+        """
         if isinstance(self.hypothesis, DriveHypothesis):
             return list(segments)
-        return [self.hypothesis.applied(s, self.size) for s in segments]
+        begin = segments if self.unit == "1" else [prompt(s) for s in segments]
+        return [self.hypothesis.applied(s, self.size) for s in begin]
 
     @property
     def linear(self) -> bool:
@@ -139,6 +143,11 @@ class RecordingFault:
         corner = f"{1.0 / (2.0 * np.pi * abs(self.size)):.3g} Hz" if self.unit == "s" and self.size else ""
         size = percent(abs(self.size)) if self.unit == "1" else f"{1e3 * abs(self.size):.3g} m{self.unit}"
         return self.hypothesis.text.format(size=size, late=late, much=much, corner=corner)
+
+
+def prompt(segments: Segments) -> Segments:
+    """Segments, their channels taken to be no later than what was named says."""
+    return replace(segments, readings=tuple(replace(r, delay=r.named) for r in segments.readings))
 
 
 def recording_faults(at: Linearisation, disturbances: bool = True) -> list[RecordingFault]:
