@@ -171,11 +171,11 @@ class Search:
         if not self._strict(strict) or self.nothing_left(strict):
             return None
         self.say("fitting the model within the tolerances of its data sheet")
+        # What lies at its bound may be far beyond it, and where much is left so may be what stopped short of it.
         at_bound = strict.linearisation.parameters.at_bound
-        # What lies at its bound may be far beyond it.
         far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
         try:
-            model = self.begun_beyond(relaxed(strict.model), [k for k in stretched(self.given) if k in at_bound])
+            model = self.begun_beyond(relaxed(strict.model), stretched(self.given)) if far else relaxed(strict.model)
             loose = self.nearer(model, far)
         except SimulationError:  # it went where the plant does not run
             return None
@@ -205,7 +205,7 @@ class Search:
         return self.state(found.model, self._last) if found.misfit.variance < FAR_OFF else found
 
     def begun_beyond(self, model: Model, keys: Sequence[str]) -> Model:
-        """The model, each number that lay at its bound where it leaves short segments least, wherever it may go.
+        """The model, each of these numbers where it leaves short segments least, wherever it may go.
 
         Between a wrong resonance and the right one there is no way downhill.
         """
