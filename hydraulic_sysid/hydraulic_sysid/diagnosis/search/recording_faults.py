@@ -6,6 +6,7 @@ free parameters follow to first order (variable projection); nothing else is sim
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ MOST = 64.0  # sampling intervals by which a channel may be late, or per cent by
 TRIED = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of these, from which the best size is searched
 PER_CENT = 0.01
 FILTERED = 0.95  # sampling intervals, or per cent: by less a sound transducer with its filter is late, too …
+SAME = 0.05  # sampling intervals by which two delays are one
 ORDER = 0.6  # … and what only another order of conversion would make early
 PRESSURES = ("pressure_a", "pressure_b")
 
@@ -118,6 +120,13 @@ class RecordingFault:
             return list(segments)
         begin = segments if self.unit == "1" else [prompt(s) for s in segments]
         return [self.hypothesis.applied(s, self.size) for s in begin]
+
+    def starts(self, dt: float) -> list[RecordingFault]:
+        """It, and a delay by whole sampling intervals [s] before it: loggers are late by a cycle, not by a part."""
+        if isinstance(self.hypothesis, DriveHypothesis) or self.hypothesis.what != "delay":
+            return [self]
+        whole = math.copysign(max(round(abs(self.size) / dt), 1) * dt, self.size)
+        return [self] if abs(self.size - whole) < SAME * dt else [replace(self, size=whole), self]
 
     @property
     def linear(self) -> bool:

@@ -96,6 +96,7 @@ FAR_OFF = 4.0  # mean square over noise from which a fit need not be finished
 ROUNDS = 6  # of estimating noise and delays and fitting again, at most
 MOST_SWAPS = 3
 PROMISED = 0.5  # of what an effect must explain, or of what a number explains, which must show for a fit to its end
+GLIMPSED = 0.25  # the same of a fault of a channel's reading, which is tried before the model is fitted with it
 LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
 LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
 
@@ -175,7 +176,9 @@ class Search:
         at_bound = strict.linearisation.parameters.at_bound
         far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
         try:
-            model = self.begun_beyond(relaxed(strict.model), stretched(self.given)) if far else relaxed(strict.model)
+            # What is far off is bent to imitate what it lacks: the model file's values are nearer to the truth.
+            model = relaxed(self.as_filed(strict.model) if far else strict.model)
+            model = self.begun_beyond(model, stretched(self.given)) if far else model
             loose = self.nearer(model, far)
         except SimulationError:  # it went where the plant does not run
             return None
@@ -269,10 +272,12 @@ class Search:
             self.rivals = [f for f in named if not f.linear and f.reduction >= enough][:FULL]
             # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
             least = base.misfit.fit - best - base.misfit.least
-            if not faults or faults[0].reduction < (1.0 if faults[0].linear else PROMISED) * least:
+            readings = [f for f in faults if not f.linear]
+            near = [f for f in readings if f.reduction >= max(NEAR * readings[0].reduction, GLIMPSED * least)][:FULL]
+            if faults and faults[0].linear and faults[0].reduction >= least:
+                near = faults[:1]
+            if not near:
                 break
-            near = [f for f in faults if not f.linear and f.reduction >= NEAR * faults[0].reduction][:FULL]
-            near = faults[:1] if faults[0].linear else near
             found = min((self.with_fault(base, f) for f in near), key=lambda f: f.misfit.total)
             if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
@@ -324,10 +329,14 @@ class Search:
     def with_fault(self, base: SearchState, fault: RecordingFault) -> FaultFit:
         """A state fitted to records that are taken to have a fault, again while the fault's best size changes."""
         self.say(f"fitting with: {fault.text}")
-        before = self.split
+        before, tried = self.split, list[tuple[RecordingFault, SearchState, Split]]()
         try:
-            self.split = replace(before, segments=fault.applied(base.linearisation))
-            state = self.state(base.model, self._last)
+            for sized in fault.starts(before.interval):
+                self.split = replace(before, segments=sized.applied(base.linearisation))
+                tried.append((sized, self.begun_anew(self.state(base.model, self._last)), self.split))
+                if tried[-1][1].misfit.variance - 1.0 < NOTHING_LEFT:
+                    break
+            fault, state, self.split = min(tried, key=lambda one: one[1].misfit.total)
             for _ in range(MOST_SIZES):
                 new, error = resized(state.linearisation, fault), SAME_SIZE * abs(fault.size)
                 if new is fault or abs(new.size - fault.size) < max(error, 2.0 * new.standard_error):
@@ -510,12 +519,15 @@ class Search:
         """
         if state.misfit.variance - 1.0 < NOTHING_LEFT:
             return state
-        filed = {k: self.given.value(k) for k in self.given.movable_keys()}
         try:
-            again = self.state(state.model.with_values(filed), self._last)
+            again = self.state(self.as_filed(state.model), self._last)
         except SimulationError:
             return state
         return min(state, again, key=lambda s: s.misfit.total)
+
+    def as_filed(self, model: Model) -> Model:
+        """A model with the values of the model file, where that has them."""
+        return model.with_values({k: self.given.value(k) for k in self.given.movable_keys()})
 
     def _strict(self, base: SearchState) -> bool:
         """Whether the data sheet is as it was given."""
