@@ -12,7 +12,9 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search.holdout import Split
-from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, RecordingFault
+from hydraulic_sysid.diagnosis.search.misfit import Misfit
+from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, Hypothesis, RecordingFault
+from hydraulic_sysid.diagnosis.search.remainder import Remainder, immaterial
 from hydraulic_sysid.diagnosis.search.search import together
 from hydraulic_sysid.diagnosis.search.set_aside import accidents
 from hydraulic_sysid.diagnosis.search.verdict import set_aside_sentences
@@ -125,6 +127,46 @@ def test_a_fit_with_priors_ends_where_the_closed_form_says() -> None:
     exact = np.linalg.solve(a.T @ a + ridge, a.T @ y + ridge @ mean)
     assert np.allclose(found.values, exact, atol=1e-6)
     assert begin.prior_cost == pytest.approx((2.0 / 0.1) ** 2 + (5.0 / 0.5) ** 2)
+
+
+def hypothesis(name: str) -> Hypothesis:
+    return next(h for h in HYPOTHESES if h.name == name)
+
+
+@pytest.mark.parametrize(
+    ("size", "begun_at"),
+    [(-0.45e-3, [-1e-3, -0.45e-3]), (2.6e-3, [3e-3, 2.6e-3]), (0.2e-3, [1e-3, 0.2e-3]), (-1.02e-3, [-1.02e-3])],
+)
+def test_a_delay_is_begun_from_whole_sampling_intervals_too(size: float, begun_at: list[float]) -> None:
+    fault = RecordingFault(hypothesis("pressures"), size, 1e-6, 1.0)
+    assert [f.size for f in fault.starts(DT)] == pytest.approx(begun_at)
+
+
+def test_a_gain_and_a_low_pass_are_begun_where_they_were_found() -> None:
+    for name in ("pressure_a_gain", "pressures_low_pass"):
+        fault = RecordingFault(hypothesis(name), 0.004, 1e-6, 1.0)
+        assert fault.starts(DT) == [fault]
+
+
+def test_a_low_pass_is_sized_without_the_small_delays_that_hid_a_part_of_it() -> None:
+    segments = cut([simulated({}, 2.0)], "hydraulic", 0.5, False)[0]
+    hidden = replace(segments, readings=(Reading(delay=-3e-4), *[Reading(delay=3.5e-4, named=1e-4)] * 2))
+    (found,) = RecordingFault(hypothesis("pressures_low_pass"), 2e-3, 1e-6, 1.0).on([hidden])
+    assert found.readings == (Reading(), *[Reading(delay=1e-4, named=1e-4, lag=2e-3)] * 2)
+    (scaled,) = RecordingFault(hypothesis("pressure_a_gain"), 0.02, 1e-6, 1.0).on([hidden])
+    assert [r.delay for r in scaled.readings] == [r.delay for r in hidden.readings]
+
+
+@pytest.mark.parametrize(
+    ("over_noise", "share", "nothing"),
+    [(1.05, 4e-3, True), (1.05, 6e-3, False), (20.0, 9e-4, True), (20.0, 2e-3, False)],
+)
+def test_what_matters_depends_on_the_motion_however_quiet_the_sensors(
+    over_noise: float, share: float, nothing: bool
+) -> None:
+    left = [Remainder("position", share * 0.01, 1e-6, 0.01), Remainder("pressure_a", 0.0, 1.0, 1e5)]
+    misfit = Misfit(1000.0 * over_noise**2, 500.0 * over_noise**2, 1000, 500)
+    assert immaterial(misfit, left) == nothing
 
 
 def simulated(values: Mapping[str, float], seconds: float = 4.0) -> Record:
