@@ -29,8 +29,8 @@ MOST = 64.0  # sampling intervals by which a channel may be late, or per cent by
 TRIED = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of these, from which the best size is searched
 PER_CENT = 0.01
 FILTERED = 0.95  # sampling intervals, or per cent: by less a sound transducer with its filter is late, too …
-SAME = 0.05  # sampling intervals by which two delays are one
 ORDER = 0.6  # … and what only another order of conversion would make early
+SAME = 0.05  # sampling intervals by which two delays are one
 PRESSURES = ("pressure_a", "pressure_b")
 
 
@@ -118,7 +118,7 @@ class RecordingFault:
         """
         if isinstance(self.hypothesis, DriveHypothesis):
             return list(segments)
-        begin = segments if self.unit == "1" else [prompt(s) for s in segments]
+        begin = segments if self.unit == "1" else [without_small_delays(s) for s in segments]
         return [self.hypothesis.applied(s, self.size) for s in begin]
 
     def starts(self, dt: float) -> list[RecordingFault]:
@@ -154,7 +154,7 @@ class RecordingFault:
         return self.hypothesis.text.format(size=size, late=late, much=much, corner=corner)
 
 
-def prompt(segments: Segments) -> Segments:
+def without_small_delays(segments: Segments) -> Segments:
     """Segments, their channels taken to be no later than what was named says."""
     return replace(segments, readings=tuple(replace(r, delay=r.named) for r in segments.readings))
 

@@ -177,7 +177,7 @@ class Search:
         far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
         try:
             # What is far off is bent to imitate what it lacks: the model file's values are nearer to the truth.
-            model = relaxed(self.as_filed(strict.model) if far else strict.model)
+            model = relaxed(self.with_filed_values(strict.model) if far else strict.model)
             model = self.begun_beyond(model, stretched(self.given)) if far else model
             loose = self.nearer(model, far)
         except SimulationError:  # it went where the plant does not run
@@ -520,12 +520,12 @@ class Search:
         if state.misfit.variance - 1.0 < NOTHING_LEFT:
             return state
         try:
-            again = self.state(self.as_filed(state.model), self._last)
+            again = self.state(self.with_filed_values(state.model), self._last)
         except SimulationError:
             return state
         return min(state, again, key=lambda s: s.misfit.total)
 
-    def as_filed(self, model: Model) -> Model:
+    def with_filed_values(self, model: Model) -> Model:
         """A model with the values of the model file, where that has them."""
         return model.with_values({k: self.given.value(k) for k in self.given.movable_keys()})
 

@@ -230,9 +230,8 @@ def remainder_sentence(found: Sequence[Remainder]) -> str:
     if not seen:
         return "Nothing remains beyond the noise."
     sizes = _and([f"{quantity(r.beyond, UNITS[r.channel], 2)} of {TITLES[r.channel]}" for r in seen])
-    worst = max(r.share for r in seen)
-    share = percent(worst) if worst >= NOTHING else "0.1 %"
-    return f"What remains beyond the noise is {sizes}, at most {share} of the motion in a segment."
+    most = percent(max(NOTHING, *(r.share for r in seen)))
+    return f"What remains beyond the noise is {sizes}, at most {most} of the motion in a segment."
 
 
 def noise_sentences(result: SearchResult) -> list[str]:
