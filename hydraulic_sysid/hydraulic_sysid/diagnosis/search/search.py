@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -408,7 +409,8 @@ class Search:
         """
         held = HeldNumbers.of(final.linearisation, self.given)
         enough = least_cost(final.misfit.count, final.misfit.variance)
-        for moved in held.fewest(enough):
+        # Far from the file's values the quadratic says little: the data sheet as it is comes first, fitted.
+        for moved in chain([()], filter(None, held.fewest(enough))):
             done = strict if strict is not None and not moved else self.with_moved(final, moved)
             if done.misfit.total - final.misfit.total <= enough:
                 break
