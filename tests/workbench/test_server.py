@@ -41,6 +41,8 @@ class AnsweringGraph:
     def __init__(self) -> None:
         self.asked: list[str] = []
         self.silent = False
+        self.slow = asyncio.Event()
+        self.slow.set()
 
     async def trigger(self, name: str, patience: float = 5.0) -> Said:
         if self.silent:
@@ -50,6 +52,9 @@ class AnsweringGraph:
 
     async def switch(self, name: str, on: bool, patience: float = 5.0) -> Said:
         self.asked.append(f"{name} {on}")
+        await self.slow.wait()
+        if self.silent:
+            raise NoAnswerError(f"nobody serves {name}")
         return Said(on, "enabled" if on else "disabled")
 
     async def change_state(self, node: str, transition: str, patience: float) -> bool:
@@ -293,7 +298,16 @@ def test_the_board_says_what_enabling_will_do(tmp_path: Path) -> None:
             assert (await json_of(client.post("/api/plant/enable", json={"on": True})))["ok"]
             assert bench.graph.asked == ["enable True"]
             await json_of(client.post("/api/plant/stop", json={}), 409)
+            bench.graph.slow.clear()
+            waiting = asyncio.create_task(json_of(client.post("/api/plant/enable", json={"on": True})))
+            await asyncio.sleep(0.2)
+            assert (await json_of(client.post("/api/stop", json={})))["ok"]
+            assert await waiting == {"ok": False, "message": "taken back before the plant had answered"}
+            bench.graph.slow.set()
             bench.graph.silent = True
+            bench.graph.asked.clear()
+            told = await json_of(client.post("/api/plant/enable", json={"on": True}), 503)
+            assert "nobody serves enable" in told["error"] and bench.graph.asked == ["enable True", "enable False"]
             answer = await json_of(client.post("/api/stop", json={}))
             assert not answer["ok"] and "watchdog" in answer["message"]
 

@@ -279,7 +279,7 @@ class Search:
                 near = faults[:1]
             if not near:
                 break
-            found = min((self.with_fault(base, f) for f in near), key=lambda f: f.misfit.total)
+            found = self.plainest(base, [self.with_fault(base, f) for f in near])
             if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
             if leaves_most(base.misfit, found.misfit) or base.misfit.fit - found.misfit.fit < least:
@@ -349,6 +349,27 @@ class Search:
             return FaultFit(fault, state, self.split, worth)
         finally:
             self.split = before
+
+    def plainest(self, base: SearchState, fits: Sequence[FaultFit]) -> FaultFit:
+        """Of fits with different faults the best; of those that explain much alike, with the data sheet as it is.
+
+        One transducer that reads too little is the other one that reads too much, with other areas and another supply.
+        """
+        best = min(fits, key=lambda f: f.misfit.total)
+        worth = NEAR * (base.misfit.total - best.misfit.total)
+        alike = [f for f in fits if base.misfit.total - f.misfit.total >= worth]
+        if len(alike) < 2 or self._strict(base):
+            return best
+        before, left = self.split, list[float]()
+        try:
+            for fit in alike:
+                self.split = fit.split
+                left.append(self.with_moved(fit.state, ()).misfit.total)
+        except SimulationError:  # the data sheet as it is does not run with what was fitted
+            return best
+        finally:
+            self.split = before
+        return alike[left.index(min(left))]
 
     def _laws(self, model: Model) -> list[str]:
         """Parameters that stand for a law: the free ones, not the numbers that a data sheet states."""

@@ -22,6 +22,7 @@ from hydraulic_workbench.plant_kinds import ATTACHED, CAN_VIRTUAL, DEVICES, GUES
 from hydraulic_workbench.processes import Processes
 
 START_S = 300.0  # the first start on a machine compiles the physics
+ENABLE_S = 15.0  # a busy machine loses an answer, or takes seconds to find who asked
 NOTHING = Chosen("none", "", lockstep=False)
 
 
@@ -45,6 +46,7 @@ class Plant:
         self._child: Child | None = None
         self._devices: Child | None = None
         self._starting: asyncio.Task[None] | None = None
+        self._enabling: asyncio.Future[Said] | None = None
         self._faults: list[dict[str, Any]] = []
         self._phase, self._text = "stopped", "no plant runs"
         self._lock = asyncio.Lock()
@@ -146,8 +148,29 @@ class Plant:
         self._health.rows.clear()
 
     async def enable(self, on: bool) -> Said:
-        """Let commands through, or no longer."""
-        return await self._graph.switch("enable", on)
+        """Let commands through, or no longer. What is asked later takes the place of what still waits for an answer.
+
+        :raises NoAnswerError: the plant does not answer; what was asked to enable was then asked not to.
+        """
+        self._take_back()
+        asked = self._enabling = asyncio.ensure_future(self._graph.switch("enable", on, ENABLE_S))
+        try:
+            return await asked
+        except asyncio.CancelledError:
+            if self._enabling is asked:
+                raise
+            return Said(False, "taken back before the plant had answered")
+        except NoAnswerError:
+            if on:
+                with suppress(NoAnswerError):
+                    await self._graph.switch("enable", False, 1.0)
+            raise
+
+    def _take_back(self) -> None:
+        """No longer repeat a request to enable that waits for an answer."""
+        waiting, self._enabling = self._enabling, None
+        if waiting is not None:
+            waiting.cancel()
 
     async def reset(self) -> Said:
         """Release a latched stop."""
@@ -156,6 +179,7 @@ class Plant:
     async def emergency_stop(self) -> dict[str, Any]:
         """0 V at once, latched; how long the answer took."""
         begun = time.perf_counter()
+        self._take_back()
         try:
             said = await self._graph.trigger("emergency_stop", 3.0)
         except NoAnswerError as error:

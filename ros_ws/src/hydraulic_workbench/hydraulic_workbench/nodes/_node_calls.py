@@ -32,6 +32,7 @@ class NodeCalls:
         self._clients: dict[tuple[str, str], Any] = {}
         for name in ("emergency_stop", "reset"):  # made ahead: a stop must find its service at once
             self._client(_TRIGGER, name)
+        self._client(_SET_BOOL, "enable")
 
     async def trigger(self, name: str, patience: float = 5.0) -> Said:
         """See `calls.Graph`."""
