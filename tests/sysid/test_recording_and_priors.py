@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -19,14 +22,16 @@ from hydraulic_sysid.diagnosis.search.search import together
 from hydraulic_sysid.diagnosis.search.set_aside import accidents
 from hydraulic_sysid.diagnosis.search.verdict import set_aside_sentences
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
-from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations, minimise
+from hydraulic_sysid.estimation.levenberg_marquardt import Exact, NormalEquations, minimise
 from hydraulic_sysid.estimation.noise import robust_noise_std
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
+from hydraulic_sysid.estimation.parallel import lazy, results
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.projection import Projection
 from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.refinement import but_accidents, outlying
 from hydraulic_sysid.estimation.segments import cut
+from hydraulic_sysid.estimation.shooting import better
 
 Array = np.ndarray
 
@@ -92,7 +97,21 @@ def test_without_nuisance_only_the_initial_states_are_taken() -> None:
     assert np.allclose(found.residual[0], raw[0] - jacobian[0] @ best, atol=1e-5)
 
 
-class Line:
+def test_of_two_initial_states_that_counts_which_leaves_less_beyond_the_nuisance() -> None:
+    """One may ask the nuisance for much, as hum does: by the sum of squares alone no initial state would get there."""
+    draw = np.random.default_rng(3)
+    hum, noise = 20.0 * draw.standard_normal((1, 30, 1)), draw.standard_normal((1, 30))
+    found = Projection.of(noise, draw.standard_normal((1, 30, 3)), hum)
+    far, near = found.with_raw(5.0 * noise), found.with_raw(noise + 2.0 * hum[..., 0])
+    assert np.sum(near.raw**2) > 10.0 * np.sum(far.raw**2)
+    states, left = better(([np.zeros((1, 4))], [far]), ([np.ones((1, 4))], [near]))
+    assert states[0].min() == 1.0 and np.array_equal(left[0].raw, near.raw)
+    lost = found.with_raw(np.full((1, 30), 1e200))
+    states, _ = better(([np.zeros((1, 4))], [far]), ([np.ones((1, 4))], [lost]))
+    assert states[0].max() == 0.0, "a run that leaves all bounds"
+
+
+class Line(Exact):
     """A linear fit y = A·x with what is known of x beforehand."""
 
     def __init__(self, a: Array, y: Array, parameters: Parameters) -> None:
@@ -127,6 +146,86 @@ def test_a_fit_with_priors_ends_where_the_closed_form_says() -> None:
     exact = np.linalg.solve(a.T @ a + ridge, a.T @ y + ridge @ mean)
     assert np.allclose(found.values, exact, atol=1e-6)
     assert begin.prior_cost == pytest.approx((2.0 / 0.1) ** 2 + (5.0 / 0.5) ** 2)
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Residuals x + x³/3 − y of many values; derivatives are carried on from point to point."""
+
+    parameters: Parameters
+    y: Array
+    derived: float | None = None
+    taken: ClassVar[int] = 0
+
+    @property
+    def left(self) -> Array:
+        x = self.parameters.values[0]
+        return np.asarray(x + x**3 / 3.0 - self.y)
+
+    @property
+    def cost(self) -> float:
+        return float(self.left @ self.left)
+
+    @property
+    def exact(self) -> bool:
+        return self.derived is None
+
+    @cached_property
+    def slope(self) -> float:
+        if self.derived is not None:
+            return self.derived
+        Bend.taken += 1
+        return float(1.0 + self.parameters.values[0] ** 2)
+
+    @property
+    def normal(self) -> NormalEquations:
+        columns = np.full((self.y.size, 1), self.slope)
+        return NormalEquations(columns.T @ columns, (columns * self.left[:, None],))
+
+    def moved(self, change: Array) -> Bend:
+        return replace(self, parameters=self.parameters.moved(change), derived=self.slope)
+
+    def made_exact(self) -> Bend:
+        return replace(self, derived=None)
+
+
+def test_derivatives_are_carried_on_but_no_fit_ends_by_them() -> None:
+    y = 1.0 + 1e-3 * np.random.default_rng(4).standard_normal(50)
+    found = minimise(Bend(Parameters.unbounded(np.array([1.2])), y), 50, 1e-12)
+    x = found.point.parameters.values[0]
+    assert found.converged and found.point.exact
+    assert x + x**3 / 3.0 == pytest.approx(y.mean(), abs=1e-8)
+    assert Bend.taken < found.iterations
+
+
+def test_what_a_worker_asks_for_it_does_alone() -> None:
+    def inner(number: int) -> str:
+        return threading.current_thread().name
+
+    def outer(number: int) -> tuple[str, set[str]]:
+        return threading.current_thread().name, set(results(inner, range(5)))
+
+    found = list(results(outer, range(20)))
+    assert all(own == {name} for name, own in found)
+    assert threading.current_thread().name not in {name for name, _ in found}
+
+
+def test_what_is_lazy_holds_no_lock() -> None:
+    """Two objects at once: each waits in its own for the other's."""
+    both = threading.Barrier(2)
+
+    class One:
+        @lazy
+        def value(self) -> int:
+            return both.wait(timeout=30.0)
+
+    ones = One(), One()
+    threads = [threading.Thread(target=lambda one=one: one.value) for one in ones]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(one.value for one in ones) == [0, 1]
 
 
 def hypothesis(name: str) -> Hypothesis:

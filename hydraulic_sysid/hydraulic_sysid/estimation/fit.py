@@ -20,6 +20,7 @@ from hydraulic_sysid.data.records import Record
 
 from .errors import CalibrationError
 from .levenberg_marquardt import Minimum, NormalEquations, minimise
+from .parallel import results
 from .parameters import NO_PRIORS, Parameters, Priors
 from .projection import Projection
 from .segments import Segments, cut, segment_length
@@ -61,7 +62,8 @@ class FitSettings:
 class FitPoint:
     """Parameters and initial states of a fit, and what is left there. Nothing of it changes: a step gives another.
 
-    ``directions_cost``: sum of squares where the directions in which initial states act were taken.
+    ``directions_cost``: sum of squares where the directions in which initial states act were taken; ``derived``: the
+    derivatives of the point before, with what the step there has shown of them (Broyden, Math. Comp. 19 (1965) 577).
     """
 
     shooting: Shooting
@@ -70,6 +72,7 @@ class FitPoint:
     projections: list[Projection]
     robust: bool = False
     directions_cost: float = 0.0
+    derived: list[Array] | None = None
 
     @classmethod
     def begin(
@@ -99,27 +102,43 @@ class FitPoint:
         squares = sum(np.sum(loss(p.residual, self.robust)) for p in self.projections)
         return float(squares) + self.parameters.prior_cost
 
+    @property
+    def costs(self) -> list[Array]:
+        """(S,) per record: sum of squares of each segment."""
+        return [p.costs for p in self.projections]
+
     @cached_property
     def normal(self) -> NormalEquations:
         """With the initial states eliminated."""
-        information = np.diag(self.parameters.prior_information)
-        scores = []
-        for p, beyond in zip(self.projections, self.beyond(self.columns), strict=True):
-            weighted = beyond * _weights(p.residual, self.robust)[..., None]
-            information += np.tensordot(weighted, beyond, axes=([0, 1], [0, 1]))
-            scores.append(np.einsum("smp,sm->sp", weighted, p.residual))
+        each = zip(self._beyond, [p.residual for p in self.projections], strict=True)
+        parts = list(results(lambda one: self._normal_of(*one), each))
+        information = np.diag(self.parameters.prior_information) + sum(own for own, _ in parts)
+        scores = [score for _, score in parts]
         return NormalEquations(information, tuple(scores), self.parameters.prior_gradient)
+
+    def _normal_of(self, beyond: Array, residual: Array) -> tuple[Array, Array]:
+        """What one record gives to the normal equations: JᵀJ and, per segment, Jᵀr."""
+        weighted = beyond * _weights(residual)[..., None] if self.robust else beyond
+        score = (np.swapaxes(weighted, -1, -2) @ residual[..., None])[..., 0]
+        return np.asarray(np.tensordot(weighted, beyond, axes=([0, 1], [0, 1]))), score
 
     @cached_property
     def columns(self) -> list[Array]:
         """Derivatives (S, m, P) of the residuals by the parameters over their scales, per record."""
+        if self.derived is not None:
+            return self.derived
         return self.shooting.jacobian(
             self.plant, self.parameters, self.initial_states, [p.raw for p in self.projections]
         )
 
+    @cached_property
+    def _beyond(self) -> list[Array]:
+        return self.beyond(self.columns)
+
     def beyond(self, columns: Sequence[Array]) -> list[Array]:
         """What of them the initial states cannot explain."""
-        return [p.beyond(c) for p, c in zip(self.projections, columns, strict=True)]
+        pairs = zip(self.projections, columns, strict=True)
+        return list(results(lambda pair: pair[0].beyond(pair[1]), pairs))
 
     def settled(
         self,
@@ -152,12 +171,33 @@ class FitPoint:
             for ahead in (steps, [p.raw + s for p, s in zip(self.projections, steps, strict=True)])
         ]
         try:
-            states, raw = shooting.better(plant, *starts)
-            before = [p.with_raw(r) for p, r in zip(self.projections, raw, strict=True)]
+            states, before = shooting.better(plant, self.projections, *starts)
             initial_states, projections = shooting.improved(plant, states, before)
         except SimulationError:
             return None
-        return replace(self, parameters=parameters, initial_states=initial_states, projections=projections)
+        there = replace(
+            self, parameters=parameters, initial_states=initial_states, projections=projections, derived=None
+        )
+        return replace(there, derived=self._derived(change, projections)) if there.cost < self.cost else there
+
+    def _derived(self, change: Array, there: Sequence[Projection]) -> list[Array]:
+        """The derivatives, so changed that they give what a step has shown, and little where it did not lead."""
+        weighted = change * np.diag(self.normal.information)
+        share = weighted / max(float(weighted @ change), 1e-300)
+        found = []
+        for columns, own, p, new in zip(self.columns, self._beyond, self.projections, there, strict=True):
+            shown = p.beyond((new.raw - p.raw)[..., None])[..., 0]
+            found.append(columns + (shown - own @ change)[..., None] * share)
+        return found
+
+    @property
+    def exact(self) -> bool:
+        """Whether `columns` are those of this point."""
+        return self.derived is None
+
+    def made_exact(self) -> FitPoint:
+        """This point with derivatives of its own."""
+        return self if self.derived is None else replace(self, derived=None)
 
     def with_new_directions(self, least: float) -> FitPoint:
         """This point, its directions of the initial states taken anew where they are old.
@@ -208,21 +248,25 @@ class FitPoint:
             return self
         far = self.subset(chosen)
         own, anew = far._settled_on(far.initial_states), far._settled_on(far.shooting.initial_states)
-        better = [b < a for a, b in zip(own._costs(), anew._costs(), strict=True)]
-        return self.with_subset(chosen, own.with_subset(better, anew.subset(better)))
+        return self.with_subset(chosen, own.better_of(anew))
+
+    def better_of(self, other: FitPoint) -> FitPoint:
+        """The same parameters, each segment from that one of two points that leaves less of it."""
+        better = [b < a for a, b in zip(self.costs, other.costs, strict=True)]
+        return self.with_subset(better, other.subset(better))
 
     def _settled_on(self, initial_states: Sequence[Array]) -> FitPoint:
         """From these initial states on, in directions taken anew while that gains something in any segment."""
         point = self.settled(self.shooting, self.parameters, initial_states, _STUCK_SHARES)
+        moving: list[Mask] = [np.ones(len(c), dtype=bool) for c in point.costs]
         for _ in range(_STUCK_ROUNDS):
-            before, point = point._costs(), point.settled(point.shooting, point.parameters, None, _STUCK_SHARES)
-            if all((new > (1.0 - _SETTLED) * old).all() for old, new in zip(before, point._costs(), strict=True)):
+            part = point.subset(moving)
+            again = part.settled(part.shooting, part.parameters, None, _STUCK_SHARES)
+            before, point = point.costs, point.with_subset(moving, again)
+            moving = [a < (1.0 - _SETTLED) * b for b, a in zip(before, point.costs, strict=True)]
+            if not any(m.any() for m in moving):
                 break
         return point
-
-    def _costs(self) -> list[Array]:
-        """(S,) per record: sum of squares of each segment from its initial states as they are."""
-        return [np.sum(p.raw**2, axis=1) for p in self.projections]
 
     def with_subset(self, chosen: Sequence[Mask], point: FitPoint) -> FitPoint:
         """This point with initial states and residuals of ``point``, one of its subsets at the same parameters."""
@@ -274,7 +318,7 @@ class Fit:
         if not self.point.robust:
             return self.rms
         residuals = [p.residual for p in self.point.projections]
-        return float(np.sqrt(sum(np.sum((_weights(r, True) ** 2 * r) ** 2) for r in residuals) / self._freedom))
+        return float(np.sqrt(sum(np.sum((_weights(r) ** 2 * r) ** 2) for r in residuals) / self._freedom))
 
     @property
     def _freedom(self) -> int:
@@ -348,8 +392,8 @@ def loss(residual: Array, robust: bool) -> Array:
     return 2.0 * _MILD**2 * (np.sqrt(1.0 + (residual / _MILD) ** 2) - 1.0)
 
 
-def _weights(residual: Array, robust: bool) -> Array:
-    return 1.0 / np.sqrt(1.0 + (residual / _MILD) ** 2) if robust else np.ones_like(residual)
+def _weights(residual: Array) -> Array:
+    return np.asarray(1.0 / np.sqrt(1.0 + (residual / _MILD) ** 2))
 
 
 def _misfit(segments: Sequence[Segments], residuals: Sequence[Array]) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar, cast
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -19,6 +19,7 @@ from hydraulic_sim.arrays import Array, Index
 from .covariance import inverse, sandwich
 from .parameters import Parameters
 
+_FOLLOWED = (0.7, 1.4)  # gain of a step over the predicted one, within which derivatives are carried on to the next
 LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-6, 1e-3, 1e4
 _UPHILL = 1.0  # standard errors from the optimum at which it is no failure that no step gets any lower
 
@@ -58,6 +59,9 @@ class NormalEquations:
         return NormalEquations(self.information[first:, first:] - cross.T @ solved, (gradient[None],))
 
 
+P = TypeVar("P", bound="Point")
+
+
 class Point(Protocol):
     """Where a fit stands."""
 
@@ -73,11 +77,25 @@ class Point(Protocol):
     def normal(self) -> NormalEquations | None:
         """None where the model cannot be differentiated."""
 
+    @property
+    def exact(self) -> bool:
+        """Whether the normal equations are those of this point, not derived from those of the one before."""
+
     def moved(self, change: Array) -> Point | None:
         """The point a change (P,) of the parameters away, in units of their scales; None where it does not exist."""
 
+    def made_exact(self) -> Point:
+        """The same point with normal equations of its own."""
 
-P = TypeVar("P", bound=Point)
+
+class Exact:
+    """What points have whose normal equations are always their own."""
+
+    exact = True
+
+    def made_exact(self: P) -> P:
+        """This point."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -100,7 +118,8 @@ def minimise(
 
     It is found when a step lowers the cost by less than ``least_gain`` of it, or when the next step would be shorter
     than ``tolerance`` standard errors. ``accepted`` sees every step and may hand back another point (whose residuals
-    are weighed otherwise) to go on from.
+    are weighed otherwise) to go on from. Where a step gained what was predicted the point may have derived its normal
+    equations from those before; no fit ends by such alone.
     """
     damping = _FIRST_DAMPING
     for number in range(1, most_steps + 1):
@@ -108,22 +127,37 @@ def minimise(
         if normal is None:
             return Minimum(point, False, number - 1)
         better: P | None = None
+        change = normal.gradient
         while better is None and damping <= _MOST_DAMPING:
-            tried = point.moved(bounded_step(normal, point.parameters, damping))
+            change = bounded_step(normal, point.parameters, damping)
+            tried = point.moved(change)
             if tried is not None and tried.cost < point.cost:
-                better = tried  # type: ignore[assignment]
+                better = _as(point, tried)
+            elif not point.exact:
+                point = _as(point, point.made_exact())
+                normal = point.normal or normal
             else:
                 damping *= 8.0
         if better is None:
             return Minimum(point, not tolerance or _ahead(normal, point.parameters) < _UPHILL, number)
         damping = max(damping / 5.0, LEAST_DAMPING)
-        gain = (point.cost - better.cost) / point.cost
+        gained, known = point.cost - better.cost, point.exact
+        done = gained < least_gain * point.cost
+        if done or not _FOLLOWED[0] < gained / max(normal.reduction(change), 1e-300) < _FOLLOWED[1]:
+            better = _as(better, better.made_exact())
         point = accepted(number, better)
         if point is not better:
             continue
-        if gain < least_gain or (tolerance and _ahead(point.normal, point.parameters) < tolerance):
+        if done and known:
             return Minimum(point, True, number)
-    return Minimum(point, False, most_steps)
+        if tolerance and _ahead(point.normal, point.parameters) < tolerance:
+            return Minimum(_as(point, point.made_exact()), True, number)
+    return Minimum(_as(point, point.made_exact()), False, most_steps)
+
+
+def _as(point: P, other: Point) -> P:
+    """Another point of the same fit."""
+    return cast(P, other)
 
 
 def bounded_step(normal: NormalEquations, parameters: Parameters, damping: float = 1e-9) -> Array:

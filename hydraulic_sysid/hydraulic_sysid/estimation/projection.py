@@ -58,6 +58,13 @@ class Projection:
         """(S, m) after the best (linear) change of every initial state."""
         return self.beyond(self.raw[..., None])[..., 0]
 
+    @cached_property
+    def costs(self) -> Array:
+        """(S,) sum of squares of each segment's residual; infinite where its run leaves all bounds."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = np.sum(self.residual**2, axis=1)
+        return np.where(np.isfinite(found), found, np.inf)
+
     def beyond(self, columns: Array) -> Array:
         """What of (S, m, P) the initial states and the nuisance cannot explain."""
         return columns - self.basis @ (self.taken[..., None] * (np.swapaxes(self.basis, -1, -2) @ columns))

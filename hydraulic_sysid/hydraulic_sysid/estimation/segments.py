@@ -110,6 +110,11 @@ class Segments:
         return [_STATES.index(c) for c in self.channels]
 
     @cached_property
+    def drive(self) -> Array:
+        """(N,) [V] of the whole record, in an array that compiled code takes as it is."""
+        return np.array(self.record["drive"])
+
+    @cached_property
     def _missing(self) -> list[list[tuple[int, Array]]]:
         return [noise.missing(self.outliers[:, :, c]) for c, noise in enumerate(self.noise)]
 
@@ -182,7 +187,7 @@ class Segments:
         A pressure without a sensor is that beyond what follows from motion and valve (`Shooting`), and so 0.
         """
         states = np.tile(plant.initial_state().states, (len(self), 1))
-        command = np.clip(self.record["drive"] / plant.value("drive_limit"), -1.0, 1.0)
+        command = np.clip(self.drive / plant.value("drive_limit"), -1.0, 1.0)
         begin = self.smoothed[self.first]
         for column, name in enumerate(plant.state_names):
             if name in _STATES:

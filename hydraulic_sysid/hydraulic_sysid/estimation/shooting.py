@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from hydraulic_node_utils import processors
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import Plant
 
+from .parallel import results
 from .parameters import Parameters
 from .projection import Projection
 from .segments import Segments
@@ -117,26 +116,21 @@ class Shooting:
 
         An initial state goes by that one of the ``shares`` of the way that leaves least, or stays where it was.
         """
-        states, raw = list(initial_states), [p.raw for p in before]
+        states, best = list(initial_states), list(before)
         for share in shares:
             moved = self.corrected(initial_states, before, [share * p.raw for p in before])
-            states, raw = self._better((states, raw), (moved, self.residuals(plant, moved)))
-        return states, [p.with_raw(r) for p, r in zip(before, raw, strict=True)]
+            states, best = better((states, best), (moved, self._seen_from(before, plant, moved)))
+        return states, best
 
-    def better(self, plant: Plant, one: Sequence[Array], other: Sequence[Array]) -> tuple[list[Array], list[Array]]:
-        """Of two initial states of every segment those that leave less, and their residuals (S, m)."""
-        return self._better((one, self.try_out(plant, one)), (other, self.residuals(plant, other)))
+    def better(
+        self, plant: Plant, before: Sequence[Projection], one: Sequence[Array], other: Sequence[Array]
+    ) -> tuple[list[Array], list[Projection]]:
+        """Of two initial states of every segment those that leave less, in directions that are known."""
+        tried = [p.with_raw(r) for p, r in zip(before, self.try_out(plant, one), strict=True)]
+        return better((one, tried), (other, self._seen_from(before, plant, other)))
 
-    def _better(
-        self, one: tuple[Sequence[Array], Sequence[Array]], other: tuple[Sequence[Array], Sequence[Array]]
-    ) -> tuple[list[Array], list[Array]]:
-        states, residuals = list[Array](), list[Array]()
-        for old, raw, new, again in zip(*one, *other, strict=True):
-            with np.errstate(over="ignore"):  # a run that leaves all bounds is infinitely far off
-                better = (np.sum(again**2, axis=1) <= np.sum(raw**2, axis=1))[:, None]
-            states.append(np.where(better, new, old))
-            residuals.append(np.where(better, again, raw))
-        return states, residuals
+    def _seen_from(self, before: Sequence[Projection], plant: Plant, states: Sequence[Array]) -> list[Projection]:
+        return [p.with_raw(r) for p, r in zip(before, self.residuals(plant, states), strict=True)]
 
     def corrected(
         self, initial_states: Sequence[Array], projections: Sequence[Projection], residuals: Sequence[Array]
@@ -170,7 +164,7 @@ class Shooting:
         return columns
 
     def _map(self, function: Callable[..., T], items: Iterable) -> list[T]:
-        return list(_workers(processors.usable()).map(function, items))
+        return list(results(function, items))
 
     def _residual(self, plant: Plant, i: int, states: Array, inner: Inner | None = None) -> Array:
         segments = self.segments[i]
@@ -196,7 +190,7 @@ class Shooting:
     ) -> Array:
         segments = self.segments[i]
         states, memories = (inner or self._inner(plant, i)).into(states)
-        drive = segments.record["drive"] if drive is None else drive
+        drive = segments.drive if drive is None else drive
         run = self._beside(plant, i).predict(
             drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, segments.turning
         )
@@ -223,7 +217,7 @@ class Shooting:
             if len(self._known) > _MOST_KNOWN:
                 self._known.clear()
             segments = self.segments[i]
-            known = plant.track(segments.record["drive"], segments.record.dt, segments.first, segments.smoothed)
+            known = plant.track(segments.drive, segments.record.dt, segments.first, segments.smoothed)
             self._known[i, path] = known
         return known
 
@@ -251,7 +245,16 @@ class Shooting:
         return Projection.of(base, jacobian, nuisance)
 
 
-@lru_cache(maxsize=4)
-def _workers(number: int) -> ThreadPoolExecutor:
-    """The threads that all shootings of a process share; simulation holds no lock."""
-    return ThreadPoolExecutor(number)
+def better(
+    one: tuple[Sequence[Array], Sequence[Projection]], other: tuple[Sequence[Array], Sequence[Projection]]
+) -> tuple[list[Array], list[Projection]]:
+    """Of two initial states of every segment, and what they leave in the same directions, those that leave less.
+
+    That is what neither initial states nor nuisance explain: these may take up most of what a move leaves.
+    """
+    states, left = list[Array](), list[Projection]()
+    for old, p, new, q in zip(*one, *other, strict=True):
+        closer = (q.costs <= p.costs)[:, None]
+        states.append(np.where(closer, new, old))
+        left.append(p.with_raw(np.where(closer, q.raw, p.raw)))
+    return states, left

@@ -30,6 +30,7 @@ NAMED = ("piston_area_a", "piston_area_b", "dead_volume_a", "dead_volume_b", "su
 """Base parameters that a data sheet states and a diagnosis leaves as they are."""
 SIGNIFICANT = 25.0  # reduction of the sum of squares, of the variance, for which a number is named …
 PLAUSIBLE = 3.0  # times an effect's default size: a standard deviation of its size
+ROUGH = 0.02  # of what a number explains: what a prediction that far may be off
 SURE = 2.0  # standard errors by which a number must be off to be named
 VISIBLE = 0.01  # … at least this share of the number of residuals
 
@@ -185,10 +186,14 @@ class HeldNumbers:
         return Deviation(key, float(self.nominal[i]), value, error, self.cost(others) - self.cost(moved))
 
     def instead(self, key: str, moved: Sequence[str], enough: float) -> list[tuple[str, ...]]:
-        """Sets with another number in the place of ``key``, of those ``moved``, that cost ``enough`` more at most."""
+        """Sets with another number in the place of ``key``, of those ``moved``, that may cost as little.
+
+        That is ``enough`` more, or the share of what the number explains by which a quadratic may be off.
+        """
         others = [k for k in moved if k != key]
         swapped = [(*others, other) for other in self.keys if other not in moved]
-        near = [s for s in swapped if self.cost(s) < self.cost(moved) + enough]
+        least = self.cost(moved)
+        near = [s for s in swapped if self.cost(s) - least < max(enough, ROUGH * (self.cost(others) - least))]
         return sorted(near, key=self.cost)
 
 

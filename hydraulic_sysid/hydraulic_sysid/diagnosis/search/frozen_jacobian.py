@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +16,8 @@ from hydraulic_sim.arrays import Array, Mask
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations, minimise
+from hydraulic_sysid.estimation.levenberg_marquardt import Exact, NormalEquations, minimise
+from hydraulic_sysid.estimation.parallel import lazy
 from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import between
@@ -88,7 +88,7 @@ def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Seq
 
 
 @dataclass(frozen=True)
-class FrozenPoint:
+class FrozenPoint(Exact):
     """Where a quick refit stands.
 
     ``plant``: with the candidate; ``parameters``: the linearisation's and the candidate's; ``raw[i]`` (S, m): residuals
@@ -114,18 +114,18 @@ class FrozenPoint:
         bounded = all((np.abs(r) < _ENDLESS).all() for r in raw)
         return cls(linearisation, plant, parameters, initial_states, raw) if bounded else None
 
-    @cached_property
+    @lazy
     def residual(self) -> list[Array]:
         """(S, m) per record without what other initial states would explain."""
         raw = [r[..., None] for r in self.raw]
         return [r[..., 0] for r in self.linearisation.point.beyond(raw)]
 
-    @cached_property
+    @lazy
     def costs(self) -> list[Array]:
         """(S,) per record: sum of squares of each segment."""
         return [np.sum(r**2, axis=1) for r in self.residual]
 
-    @cached_property
+    @lazy
     def cost(self) -> float:
         """Sum of squares of the segments for fitting."""
         squares = sum(float(c[f].sum()) for c, f in zip(self.costs, self.linearisation.split.fit, strict=True))
@@ -135,14 +135,14 @@ class FrozenPoint:
     def _frozen(self) -> Parameters:
         return self.parameters.first(len(self.linearisation.parameters))
 
-    @cached_property
+    @lazy
     def own_columns(self) -> list[Array]:
         """Change of the residuals (S, m, Q) with each of the candidate's parameters over its scale, per record."""
         own = self.parameters.after(len(self.linearisation.parameters))
         plant = self.plant.with_parameters(self.parameters.by_key)
         return self.linearisation.point.shooting.jacobian(plant, own, self.initial_states, self.raw)
 
-    @cached_property
+    @lazy
     def normal(self) -> NormalEquations | None:
         """None where the candidate's parameters cannot be moved."""
         try:

@@ -31,10 +31,21 @@ class Linearisation:
     known: list[Array] | None = None
 
     @classmethod
-    def of(cls, model: Model, split: Split, priors: Priors = NO_PRIORS) -> Linearisation:
-        """Of a model that was fitted before."""
-        point = FitPoint.begin(Plant.for_fits(model), split.segments, model.movable_keys(), priors=priors).at_rest()
-        return cls(model, split, point)
+    def of(
+        cls, model: Model, split: Split, priors: Priors = NO_PRIORS, fitted: Sequence[Array] | None = None
+    ) -> Linearisation:
+        """Of a model that was fitted before.
+
+        :param fitted: initial states (S_i, n_states) that the segments for fitting were fitted with, of every record
+            that has such
+        """
+        plant, keys = Plant.for_fits(model), model.movable_keys()
+        point = FitPoint.begin(plant, split.segments, keys, priors=priors)
+        if fitted is not None:
+            part = point.subset(split.fit)
+            part = part.better_of(part.settled(part.shooting, part.parameters, fitted))
+            point = point.with_subset(split.fit, part)
+        return cls(model, split, point.at_rest())
 
     @property
     def columns(self) -> list[Array]:
@@ -108,6 +119,12 @@ class Linearisation:
             keep[np.flatnonzero(fit)[::every]] = True
             chosen.append(keep)
         return self._subset(chosen), sum(int(c.sum()) for c in chosen) / max(total, 1)
+
+    def of_one_record(self) -> Linearisation:
+        """The same on the segments for fitting of the record that leaves most."""
+        left = [float(np.sum(c[f])) for c, f in zip(self.costs, self.split.fit, strict=True)]
+        most = left.index(max(left))
+        return self._subset([f if i == most else np.zeros_like(f) for i, f in enumerate(self.split.fit)])
 
     def slim(self) -> Linearisation:
         """The same without ``columns``, which only refits need: a search keeps several linearisations in memory."""

@@ -18,12 +18,15 @@ from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.levenberg_marquardt import bounded_step
+from hydraulic_sysid.estimation.parallel import results
 from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import LARGE, SIZES, SMALL, Probe, RecordFeatures, between, inverse, observed, probes
 from .linearisation import Linearisation
 
 ENOUGH = 50  # segments that do for a look, spread over all records
+MANY = 8  # groups of probes of one effect, beyond which …
+NEAREST = 4  # … only those are looked at on all of these that promise most on one record's
 TOO_FAR = 1.0  # times the sum of squares that is left: a probe that changes more than this is no first order
 AS_WELL = 0.5  # of the best prediction, from which that of another shape is a start as well
 
@@ -53,28 +56,36 @@ class _Prediction:
 def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures) -> list[CandidateScore]:
     """All candidates, the best first; reductions of all segments for fitting, of which a sample is looked at."""
     part, share = at.sample(ENOUGH)
-    found = [_score(part, effect, features) for effect in effects]
+    one = part.of_one_record()
+    _ = part.normal, part.costs, one.normal, one.costs  # once, for all that work at the same time
+    found = list(results(lambda effect: _score(part, one, effect, features), effects))
     scaled = [replace(f, reduction=f.reduction / share) for f in found if f is not None]
     return sorted(scaled, key=lambda f: -f.reduction)
 
 
-def _score(at: Linearisation, effect: Effect, features: RecordFeatures) -> CandidateScore | None:
-    """By probes of usual sizes; by larger ones where those change nothing, by smaller ones where they go too far."""
+def _score(at: Linearisation, one: Linearisation, effect: Effect, features: RecordFeatures) -> CandidateScore | None:
+    """By probes of usual sizes; by larger ones where those change nothing, by smaller ones where they go too far.
+
+    ``one``: a part of the segments, on which many probes are narrowed down first.
+    """
     model = at.model.with_effect(effect.name)
-    tried = [_predictions(at, model, effect, features, SIZES)]
+
+    def predictions(sizes: Sequence[float]) -> list[_Prediction]:
+        groups = list(probes(effect, features, sizes))
+        if len(groups) > MANY:
+            rough = [(_predict(one, model, effect, group), group) for group in groups]
+            near = sorted([(p.score.reduction, i) for i, (p, _) in enumerate(rough) if p is not None], reverse=True)
+            groups = [groups[i] for _, i in near[:NEAREST]] if len(near) >= NEAREST else groups
+        every = [_predict(at, model, effect, group) for group in groups]
+        return [p for p in every if p is not None]
+
+    tried = [predictions(SIZES)]
     if not tried[0]:
-        tried.append(_predictions(at, model, effect, features, LARGE))
+        tried.append(predictions(LARGE))
     if not tried[-1] or min(p.change for p in tried[-1]) > TOO_FAR:
-        tried.append(_predictions(at, model, effect, features, SMALL))
+        tried.append(predictions(SMALL))
     found = [p.score for every in tried for p in every]
     return _best(found) if found else None
-
-
-def _predictions(
-    at: Linearisation, model: Model, effect: Effect, features: RecordFeatures, sizes: Sequence[float]
-) -> list[_Prediction]:
-    found = [_predict(at, model, effect, group) for group in probes(effect, features, sizes)]
-    return [f for f in found if f is not None]
 
 
 def _best(found: Sequence[CandidateScore]) -> CandidateScore:

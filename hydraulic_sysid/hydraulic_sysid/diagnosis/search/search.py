@@ -7,7 +7,7 @@ Then every effect added is set against what would take its place, so that a prox
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -20,6 +20,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
+from hydraulic_sysid.estimation.parallel import results
 from hydraulic_sysid.estimation.parameters import Parameters, bounded
 from hydraulic_sysid.estimation.refinement import outlying, refined, usable
 from hydraulic_sysid.estimation.segments import shorter
@@ -81,6 +82,9 @@ FEW_GAIN = 2e-3  # … while each lowers the sum of squares by this share
 NEAR = 0.93  # of the best reduction, from which a refit is finished
 MOST_EFFECTS = 3
 ENOUGH = 60  # segments, spread over all records, that do for a first fit
+LOOK = 20  # segments, spread over all records, that show where a fit from other values leads, …
+SAME_LOOK = 0.02  # … where it does not leave them less by this share: nowhere else, …
+WORSE_LOOK = 0.2  # … and where it leaves them more by this one: to something worse
 SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
 BEYOND = 8  # values of a number that lay at its bound, over all where it may go, from which a fit may begin
@@ -128,6 +132,8 @@ class Search:
         """… and the state that candidates were refitted on last, with these refits."""
         self.as_recorded: SearchState | None = None
         self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
+        self._seen: dict[frozenset[str], list[CandidateScore]] = {}
+        self._judged_with: set[str] = set()
         self.priors = priors(model)
         self._first = replace(settings, least_gain=FIRST_GAIN)
         self._few = replace(settings, most_steps=FEW_STEPS, least_gain=FEW_GAIN)
@@ -201,12 +207,16 @@ class Search:
         found = self.state(model, self._first if far else self._last)
         if found.misfit.variance - 1.0 < EXPLAINED:
             return found
+        short = found
         try:
-            short = self.state(self.fitted_to_short_segments(model), self._first)
+            values = self.fitted_to_short_segments(model)
+            if self.leads_elsewhere(values, found):
+                short = self.state(values, self._first)
         except SimulationError:  # they lead where the plant does not run
-            short = found
-        found = min(found, short, key=lambda s: s.misfit.total)
-        return self.state(found.model, self._last) if found.misfit.variance < FAR_OFF else found
+            pass
+        best = min(found, short, key=lambda s: s.misfit.total)
+        done = best.misfit.variance >= FAR_OFF or (best is found and not far)
+        return best if done else self.state(best.model, self._last)
 
     def begun_beyond(self, model: Model, keys: Sequence[str]) -> Model:
         """The model, each of these numbers where it leaves short segments least, wherever it may go.
@@ -312,6 +322,7 @@ class Search:
         at = state.linearisation
         if self._scored is None or self._scored[0] is not at:
             self._scored = at, score(at, candidates(state.model), record_features(at))
+            self._seen[frozenset(state.model.effects)] = self._scored[1]
         return self._scored[1]
 
     def within_a_sample(self, tried: CandidateRefit) -> bool:
@@ -325,7 +336,7 @@ class Search:
         """
         at = base.linearisation
         scores = score(at, [c for c in candidates(base.model) if observed(c)], record_features(at))
-        return replace(base, refits=[self.refit(base, s) for s in scores], scores=scores)
+        return replace(base, refits=list(self.refitted(base, scores, full=0)), scores=scores)
 
     def with_fault(self, base: SearchState, fault: RecordingFault) -> FaultFit:
         """A state fitted to records that are taken to have a fault, again while the fault's best size changes."""
@@ -509,6 +520,8 @@ class Search:
         found = []
         for r in [r for r in without.refits if r.misfit.total < promising][:FULL]:
             try:
+                if self.looked_at(r.refit.model) > (1.0 + WORSE_LOOK) * self.left_on_few(done):
+                    continue
                 reached = self.state(r.refit.model, self._last)
             except SimulationError:
                 continue
@@ -519,12 +532,14 @@ class Search:
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
         smooth = self._smooth(model)
-        segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
+        first = settings is self._first
+        segments = self.split.some(ENOUGH) if first else self.split.to_fit
         done = fit_segments(
             Plant.for_fits(smooth), segments, smooth.movable_keys(), settings or self.settings,
             progress=lambda *_: self.say.left(), priors=self.priors,
         )  # fmt: skip
-        at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors)
+        states = None if first else done.point.initial_states
+        at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors, states)
         if smooth is model:
             return SearchState(at.model, at, misfit(self.split, at.costs, at.parameters.prior_cost), at.residual)
         seen = refit_rounded(at, _with_values(model, at.model))
@@ -542,11 +557,33 @@ class Search:
         """
         if state.misfit.variance - 1.0 < NOTHING_LEFT:
             return state
+        filed = self.with_filed_values(state.model)
         try:
-            again = self.state(self.with_filed_values(state.model), self._last)
+            if not self.leads_elsewhere(filed, state):
+                return state
+            again = self.state(filed, self._last)
         except SimulationError:
             return state
         return min(state, again, key=lambda s: s.misfit.total)
+
+    def leads_elsewhere(self, model: Model, state: SearchState) -> bool:
+        """Whether a fit that begins with this model's values leaves a few segments clearly less than a state does."""
+        return self.looked_at(model) < (1.0 - SAME_LOOK) * self.left_on_few(state)
+
+    def looked_at(self, model: Model) -> float:
+        """What a fit to a few segments leaves of them."""
+        smooth = self._smooth(model)
+        done = fit_segments(
+            Plant.for_fits(smooth), self.split.some(LOOK), smooth.movable_keys(), self._last,
+            progress=lambda *_: self.say.left(), priors=self.priors,
+        )  # fmt: skip
+        return done.cost
+
+    def left_on_few(self, state: SearchState) -> float:
+        """What a state leaves of the same segments."""
+        model = self._smooth(state.model)
+        few = self.split.some(LOOK)
+        return FitPoint.begin(Plant.for_fits(model), few, model.movable_keys(), priors=self.priors).at_rest().cost
 
     def with_filed_values(self, model: Model) -> Model:
         """A model with the values of the model file, where that has them."""
@@ -565,10 +602,11 @@ class Search:
             model = model.without_effect(name)
         return model
 
-    def explore(self, base: SearchState, most: int = MOST_REFITS) -> SearchState:
-        """Score all candidates on a state and refit the best."""
+    def explore(self, base: SearchState, most: int = MOST_REFITS, anew: bool = True) -> SearchState:
+        """Score all candidates on a state and refit the best; not ``anew``: by the scores beside the same effects."""
         at = base.linearisation
-        scores = self.scores(base)
+        known = None if anew else self._seen.get(frozenset(base.model.effects))
+        scores = self.scores(base) if known is None else known
         if not scores:
             return base
         least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)
@@ -578,12 +616,7 @@ class Search:
         every: list[CandidateRefit] = []
         self.tried = (base, every)
         self._show(base, scores, every)
-        for number, s in enumerate(best):
-            found = self.refit(base, s)
-            for start in s.others if number < FULL else ():
-                if found.misfit.excess > (1.0 - NEAR) * base.misfit.excess:
-                    again = self.refit(base, replace(s, start=start))
-                    found = min(found, again, key=lambda r: r.misfit.total)
+        for found in self.refitted(base, best):
             every.append(found)
             self.say.reached(self._added(every[-1].refit.model), every[-1].misfit)
             self._show(base, scores, every)
@@ -600,10 +633,27 @@ class Search:
     def _added(self, model: Model) -> list[str]:
         return [e for e in model.effects if e not in self.given.effects]
 
+    def refitted(
+        self, base: SearchState, chosen: Sequence[CandidateScore], full: int = FULL
+    ) -> Iterator[CandidateRefit]:
+        """Candidates refitted on a state, in their order; the first of them from all of their starts."""
+        _ = base.linearisation.columns, base.linearisation.normal  # once, for all that work at the same time
+        jobs = results(lambda job: self._refit_from(base, job[1], job[0] < full), enumerate(chosen))
+        for one in chosen:
+            self.say(f"refitting with {one.effect.name}")
+            yield next(jobs)
+
+    def _refit_from(self, base: SearchState, candidate: CandidateScore, others: bool) -> CandidateRefit:
+        found = self.refit(base, candidate)
+        for start in candidate.others if others else ():
+            if found.misfit.excess > (1.0 - NEAR) * base.misfit.excess:
+                again = self.refit(base, replace(candidate, start=start))
+                found = min(found, again, key=lambda r: r.misfit.total)
+        return found
+
     def refit(self, base: SearchState, candidate: CandidateScore) -> CandidateRefit:
         """A candidate refitted on a state, from where its score is best."""
         at, name = base.linearisation, candidate.effect.name
-        self.say(f"refitting with {name}")
         done = refit(at, at.model.with_effect(name), candidate.start)
         if _observed(base.model):
             done = refit_rounded(at, _with_values(base.model.with_effect(name), done.model))
@@ -697,14 +747,14 @@ class Search:
     def searched(self) -> SearchResult:
         """The search itself, the data sheet as loose as it was taken."""
         found = self.forward(self.recorded(self.begin()))
-        if not decisive(found).added:
+        if not decisive(found).added or set(found.final.model.effects) == self._judged_with:
             return found
         again = self.judged_anew(self.state(found.final.model, self._last))
         return found if again is None else self.onward(found.base, found.base.model, again)
 
     def judged_anew(self, state: SearchState) -> SearchState | None:
         """A state judged by the noise and the delays that it shows; None where they are those it was judged by."""
-        before = self.split
+        before, self._judged_with = self.split, set(state.model.effects)
         again = self.judged(state)
         if not quieter(before, self.split) and not retimed(before, self.split):
             self.split = before
@@ -716,7 +766,7 @@ class Search:
         """The search from what is ``known`` on, its ``base`` and what was tried there fitted anew to ``model``."""
         tried = [r.name for r in base.refits[:LATER_REFITS]]
         again = self.state(model, self._last)
-        refits = [self.refit(again, s) for s in base.scores if s.effect.name in tried]
+        refits = list(self.refitted(again, [s for s in base.scores if s.effect.name in tried], full=0))
         again = replace(again, refits=sorted(refits, key=lambda r: r.misfit.total), scores=base.scores)
         return self.forward(again, known)
 
@@ -753,7 +803,7 @@ class Search:
             nothing = better.misfit.variance - 1.0 < NOTHING_LEFT
             last = len(added) == MOST_EFFECTS and explained(base.misfit, better.misfit) > MOSTLY
             # What was judged by a model that lacked it would ask for further effects.
-            again = None if nothing or last or better.misfit.variance >= FAR_OFF else self.judged_anew(better)
+            again = None if last or better.misfit.variance >= FAR_OFF else self.judged_anew(better)
             if again is not None:
                 return self.onward(base, base.model, again)
             path.append(better if nothing or last else self.explore(better, most=LATER_REFITS))
@@ -779,6 +829,7 @@ class Search:
         scores = score(at, [self.given.library[name]], record_features(at))
         if not scores:
             raise DiagnosisError(f"{name} changes nothing in these records: they do not excite it")
+        self.say(f"refitting with {name}")
         starts = [scores[0].start]
         if not self.given.library.is_builtin(name):  # a file of the user's own may have been made for these records
             starts.append({f"{name}.{p.name}": p.default for p in self.given.library[name].parameters})
@@ -817,7 +868,7 @@ class Search:
                 continue
             if name in competing:
                 continue
-            without = self.explore(without, most=LATER_REFITS)
+            without = self.explore(without, most=LATER_REFITS, anew=False)
             competing = {**competing, name: without}
             # Added last, it may lead on from where the fit had stopped.
             own = [r for r in without.refits if r.name == name and r.misfit.total < state.misfit.total]

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from hydraulic_sim.arrays import Array
-from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
+from hydraulic_sysid.estimation.levenberg_marquardt import Exact, NormalEquations
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.projection import project_out
 from hydraulic_sysid.linear.errors import IdentificationError
@@ -62,7 +62,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Point:
+class Point(Exact):
     """One denominator with the best of everything else: ``theta`` linear unknowns, ``residual`` y − Φθ."""
 
     problem: Problem
