@@ -44,6 +44,15 @@ def test_the_hidden_dead_band_is_found_and_its_width_too(run: Path) -> None:
     assert set(found["noise_std"]) == {"position", "pressure_a", "pressure_b"}
 
 
+def test_a_quick_look_at_a_part_of_the_records_finds_it_too(run: Path, tmp_path: Path) -> None:
+    assert diagnose_main(["--model", "sample_bench", "--record", str(RECORDS), "--quick", "--out", str(tmp_path)]) == 0
+    whole, quick = (json.loads((folder / "diagnose.json").read_text()) for folder in (run, tmp_path))
+    assert quick["verdict"]["effects"] == ["valve_deadband"]
+    assert quick["settings"]["values_used"] <= 40_000 < whole["settings"]["values_used"]
+    names = [{r["name"] for r in found["records"]} for found in (whole, quick)]
+    assert names[0] == names[1], "a record was left out"
+
+
 def test_why_not_the_runner_up_is_said_with_its_figure(run: Path) -> None:
     found = json.loads((run / "diagnose.json").read_text())
     second = found["competing_models"]["valve_deadband"][0]

@@ -20,6 +20,7 @@ from hydraulic_sysid.estimation.fit import FitSettings
 from . import verdict as verdicts
 from .data_sheet import as_filed
 from .document import document, with_balances
+from .holdout import MOST_VALUES
 from .linearisation import Linearisation
 from .misfit import explained
 from .nonparametric_curves import NonparametricCurve, nonparametric_curves
@@ -82,20 +83,22 @@ def diagnose(
     progress: Callable[[str], None] | None = None,
     within: float | None = None,
     watch: Watch | None = None,
+    most_values: int = MOST_VALUES,
 ) -> Diagnosis:
     """Find the library effects that ``model`` lacks to explain ``records``.
 
     Parameters are fitted to ``records``; an effect counts only if it lowers the error on ``validation`` too (default:
     every third block of every record). Records need drive and position; pressures distinguish more. After ``within``
     seconds, or when the user ends it (KeyboardInterrupt), the best so far is the answer, marked as such. ``watch``
-    takes what is found meanwhile: the residual whenever it is lower, and the table of candidates.
+    takes what is found meanwhile: the residual whenever it is lower, and the table of candidates. No more than
+    ``most_values`` measured values are used, spread over all records.
 
     :raises DiagnosisError: no records, or unusable ones.
     :raises hydraulic_sim.errors.ModelError: a model that does not compose.
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
     say = progress or (lambda _: None)
-    search = Search.of(model, records, validation, settings or FitSettings(), say, within, watch)
+    search = Search.of(model, records, validation, settings or FitSettings(), say, within, watch, most_values)
     say("the records against the model file")
     checked = contradictions(model, [*records, *validation])
     found = verdicts.conclusive(search.run())

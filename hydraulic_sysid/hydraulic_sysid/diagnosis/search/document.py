@@ -43,6 +43,7 @@ def document(
             "segment_length": result.settings.length,
             "validation_block": BLOCK,
             "validation_every": None if records["validation"] else EVERY,
+            "values_used": sum(s.measured.size for s in result.split.segments),
         },
         "records": [
             {

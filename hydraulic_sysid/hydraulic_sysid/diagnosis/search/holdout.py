@@ -26,7 +26,8 @@ from .set_aside import SetAside, set_aside
 
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
-MOST_VALUES = 240_000  # measured values of all segments: eighty seconds of three channels at 1 kHz
+MOST_VALUES = 240_000  # measured values of all segments: eighty seconds of three channels at 1 kHz …
+QUICK_VALUES = 40_000  # … and for an answer in seconds: thirteen
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
 
@@ -73,10 +74,13 @@ class Split:
         return list(dict.fromkeys(c for s in self.segments for c in s.channels))
 
 
-def split(records: Sequence[Record], validation: Sequence[Record], model: Model, length: float) -> Split:
+def split(
+    records: Sequence[Record], validation: Sequence[Record], model: Model, length: float, most: int = MOST_VALUES
+) -> Split:
     """Cut ``records`` and those for ``validation`` into segments of ``length`` seconds, what is `set_aside` left out.
 
-    Records with more values than are used are taken at a lower rate, as far as the model's resonance allows.
+    Records with more than the ``most`` values that are used are taken at a lower rate, as far as the model's resonance
+    allows, and of what is still more blocks are left out.
 
     :raises hydraulic_sysid.estimation.errors.SegmentError: a record cannot be cut.
     """
@@ -84,21 +88,23 @@ def split(records: Sequence[Record], validation: Sequence[Record], model: Model,
     for record in every:
         record.require("drive", "position", error=SegmentError)
     masks, aside = set_aside(model, every, length)
-    factors = _factors(model, every, masks, length)
+    factors = _factors(model, every, masks, length, most)
     slow = [slower(r, k) for r, k in zip(every, factors, strict=True)]
     masks = [_reduced(m, k, len(r)) for m, k, r in zip(masks, factors, slow, strict=True)]
     cuts = cut(slow, model.kind, length, left_out=masks)
-    segments, used = _thinned(cuts)
+    segments, used = _thinned(cuts, most)
     if validation:
         return Split(segments, [np.full(len(s), i < len(records)) for s, i in zip(segments, used, strict=True)], aside)
     # Shifted from record to record, so that not always the same phase of an experiment is for validation.
     return Split(segments, [_alternate(np.arange(len(s)), i) for s, i in zip(segments, used, strict=True)], aside)
 
 
-def _factors(model: Model, records: Sequence[Record], left_out: Sequence[Mask], length: float) -> list[int]:
+def _factors(
+    model: Model, records: Sequence[Record], left_out: Sequence[Mask], length: float, most: int
+) -> list[int]:
     """By how much each record is slowed down: as its values ask for, and its segments and the oil allow."""
     values = [int((~m).sum()) * sum(c in r for c in MEASURED) for m, r in zip(left_out, records, strict=True)]
-    wanted = int(sum(values) / MOST_VALUES)
+    wanted = int(sum(values) / most)
     if wanted <= 1:
         return [1] * len(records)
     slowest = max(DENSE / length, PER_PERIOD * (resonance(model) or 0.0))
@@ -112,9 +118,9 @@ def _reduced(left_out: Mask, factor: int, count: int) -> Mask:
     return np.asarray(maximum_filter1d(left_out, 3 * factor)[: count * factor : factor])
 
 
-def _thinned(segments: list[Segments]) -> tuple[list[Segments], list[int]]:
-    """One block in so many of all records, where there are more than `MOST_VALUES`; and of which records they are."""
-    every = ceil(sum(s.measured.size for s in segments) / MOST_VALUES)
+def _thinned(segments: list[Segments], most: int) -> tuple[list[Segments], list[int]]:
+    """One block in so many of all records, where there are more than the ``most`` values; of which records they are."""
+    every = ceil(sum(s.measured.size for s in segments) / most)
     kept, used, before = [], [], 0
     for i, s in enumerate(segments):
         # Blocks are counted on from record to record, so that not the first one of each is kept.

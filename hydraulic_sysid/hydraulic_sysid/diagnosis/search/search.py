@@ -42,7 +42,7 @@ from .data_sheet import (
 from .drive_faults import costs_with
 from .errors import DiagnosisError
 from .frozen_jacobian import refit, refit_rounded
-from .holdout import Split, split
+from .holdout import MOST_VALUES, Split, split
 from .linearisation import Linearisation
 from .misfit import Misfit, explained, material, misfit
 from .progress import OutOfTimeError, Progress, Watch
@@ -142,12 +142,13 @@ class Search:
     @classmethod
     def of(
         cls, model: Model, records: Sequence[Record], validation: Sequence[Record], settings: FitSettings, say: Say,
-        within: float | None = None, watch: Watch | None = None,
+        within: float | None = None, watch: Watch | None = None, most_values: int = MOST_VALUES,
     ) -> Search:  # fmt: skip
         """Cut the records; free parameters without bounds get those of a data sheet.
 
         :param within: seconds after which the search ends with the best so far
         :param watch: takes what is found meanwhile
+        :param most_values: measured values that are used, spread over all records
         :raises DiagnosisError: there are no records, or one cannot be cut.
         """
         if not records:
@@ -155,8 +156,9 @@ class Search:
         model = bounded(model)
         length = settings.seconds(model, [*records, *validation])
         try:
-            cuts = split(records, validation, model, length)
-            short = partial(split, records, validation, model, shorter(length, SHORTER, [*records, *validation]))
+            cuts = split(records, validation, model, length, most_values)
+            quarter = shorter(length, SHORTER, [*records, *validation])
+            short = partial(split, records, validation, model, quarter, most_values)
             return cls(model, cuts, short, replace(settings, length=length), say, within, watch)
         except SegmentError as error:
             raise DiagnosisError(str(error)) from None
