@@ -119,10 +119,11 @@ def minimise(
     It is found when a step lowers the cost by less than ``least_gain`` of it, or when the next step would be shorter
     than ``tolerance`` standard errors. ``accepted`` sees every step and may hand back another point (whose residuals
     are weighed otherwise) to go on from. Where a step gained what was predicted the point may have derived its normal
-    equations from those before; no fit ends by such alone.
+    equations from those before; no fit ends by such alone, and steps from there are not counted.
     """
-    damping = _FIRST_DAMPING
-    for number in range(1, most_steps + 1):
+    damping, number = _FIRST_DAMPING, 0
+    while number < most_steps or not point.exact:
+        number += point.exact
         normal = point.normal
         if normal is None:
             return Minimum(point, False, number - 1)
@@ -134,10 +135,12 @@ def minimise(
             if tried is not None and tried.cost < point.cost:
                 better = _as(point, tried)
             elif not point.exact:
-                point = _as(point, point.made_exact())
-                normal = point.normal or normal
+                break
             else:
                 damping *= 8.0
+        if better is None and not point.exact:
+            point = _as(point, point.made_exact())
+            continue
         if better is None:
             return Minimum(point, not tolerance or _ahead(normal, point.parameters) < _UPHILL, number)
         damping = max(damping / 5.0, LEAST_DAMPING)
@@ -151,8 +154,10 @@ def minimise(
         if done and known:
             return Minimum(point, True, number)
         if tolerance and _ahead(point.normal, point.parameters) < tolerance:
-            return Minimum(_as(point, point.made_exact()), True, number)
-    return Minimum(_as(point, point.made_exact()), False, most_steps)
+            if point.exact:
+                return Minimum(point, True, number)
+            point = _as(point, point.made_exact())
+    return Minimum(point, False, number)
 
 
 def _as(point: P, other: Point) -> P:

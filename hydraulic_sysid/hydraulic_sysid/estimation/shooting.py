@@ -240,17 +240,15 @@ class Shooting:
             moved = states.copy()
             moved[:, index] += step
             jacobian[..., place] = (self._residual(plant, i, moved, inner) - base) / step
-        nuisance = np.concatenate((segments.nuisance, segments.starts_of_filters), axis=-1)
-        nuisance = np.pad(nuisance, ((0, 0), (0, len(segments.free)), (0, 0)))
-        return Projection.of(base, jacobian, nuisance)
+        return Projection.of(base, jacobian, *segments.all_nuisance)
 
 
 def better(
     one: tuple[Sequence[Array], Sequence[Projection]], other: tuple[Sequence[Array], Sequence[Projection]]
 ) -> tuple[list[Array], list[Projection]]:
-    """Of two initial states of every segment, and what they leave in the same directions, those that leave less.
+    """Of two initial states of every segment, and what they leave, those that leave less beyond the nuisance.
 
-    That is what neither initial states nor nuisance explain: these may take up most of what a move leaves.
+    That may take up most of what a move leaves.
     """
     states, left = list[Array](), list[Projection]()
     for old, p, new, q in zip(*one, *other, strict=True):
