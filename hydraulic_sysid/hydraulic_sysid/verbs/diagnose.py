@@ -51,8 +51,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--quick",
         action="store_true",
-        help=f"use {QUICK_VALUES} measured values, spread over all records, not up to {MOST_VALUES}: an answer in "
-        "seconds, which misses what is small",
+        help=f"use about {QUICK_VALUES} measured values, spread over all records, not up to {MOST_VALUES}: an answer "
+        "in seconds, which misses what is small",
     )
     parser.add_argument(
         "--propose",
