@@ -13,6 +13,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from hydraulic_sim.model_file import load_model
+from hydraulic_workbench.calls import Said
 from hydraulic_workbench.diagnostics import HealthBoard, Row
 from hydraulic_workbench.errors import NotNowError, UnknownError, WorkbenchError
 from hydraulic_workbench.folder import Folder, checked_name
@@ -172,6 +173,28 @@ def test_what_a_plant_says_while_it_ends_is_not_taken_for_the_next_one() -> None
     plant: Any = Plant(board, SimpleNamespace(), SimpleNamespace(stop=stop), health, nothing_commands)  # type: ignore[arg-type]
     asyncio.run(plant.stop())
     assert not health.rows
+
+
+def test_a_request_to_enable_one_plant_is_not_repeated_to_the_next_one() -> None:
+    asked: list[bool] = []
+
+    async def no_answer(name: str, on: bool, patience: float) -> Said:
+        asked.append(on)
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    async def nothing(*_: object) -> None: ...
+
+    async def test() -> Said:
+        board, graph = SimpleNamespace(change=lambda *_, **__: None), SimpleNamespace(switch=no_answer)
+        plant: Any = Plant(board, graph, SimpleNamespace(stop=nothing), HealthBoard(), nothing)  # type: ignore[arg-type]
+        waiting = asyncio.create_task(plant.enable(True))
+        await asyncio.sleep(0.05)
+        await plant.stop()
+        return await asyncio.wait_for(waiting, 10.0)
+
+    said = asyncio.run(test())
+    assert not said.ok and "taken back" in said.message and asked == [True]
 
 
 def test_progress_is_read_from_a_log_that_grows(tmp_path: Path) -> None:

@@ -139,6 +139,7 @@ class Plant:
         self._say("stopped", "no plant runs")
 
     async def _end(self) -> None:
+        self._take_back()
         await self._left()
         plant, devices = self._child, self._devices
         self._child = self._devices = None
