@@ -31,7 +31,7 @@ from hydraulic_sysid.estimation.projection import Projection
 from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.refinement import but_accidents, outlying
 from hydraulic_sysid.estimation.segments import cut
-from hydraulic_sysid.estimation.shooting import better
+from hydraulic_sysid.estimation.shooting import better_of
 
 Array = np.ndarray
 
@@ -104,10 +104,10 @@ def test_of_two_initial_states_that_counts_which_leaves_less_beyond_the_nuisance
     found = Projection.of(noise, draw.standard_normal((1, 30, 3)), hum)
     far, near = found.with_raw(5.0 * noise), found.with_raw(noise + 2.0 * hum[..., 0])
     assert np.sum(near.raw**2) > 10.0 * np.sum(far.raw**2)
-    states, left = better(([np.zeros((1, 4))], [far]), ([np.ones((1, 4))], [near]))
+    states, left = better_of(([np.zeros((1, 4))], [far]), ([np.ones((1, 4))], [near]))
     assert states[0].min() == 1.0 and np.array_equal(left[0].raw, near.raw)
     lost = found.with_raw(np.full((1, 30), 1e200))
-    states, _ = better(([np.zeros((1, 4))], [far]), ([np.ones((1, 4))], [lost]))
+    states, _ = better_of(([np.zeros((1, 4))], [far]), ([np.ones((1, 4))], [lost]))
     assert states[0].max() == 0.0, "a run that leaves all bounds"
 
 

@@ -138,10 +138,10 @@ def minimise(
                 break
             else:
                 damping *= 8.0
-        if better is None and not point.exact:
-            point = _as(point, point.made_exact())
-            continue
         if better is None:
+            if not point.exact:
+                point = _as(point, point.made_exact())
+                continue
             return Minimum(point, not tolerance or _ahead(normal, point.parameters) < _UPHILL, number)
         damping = max(damping / 5.0, LEAST_DAMPING)
         gained, known = point.cost - better.cost, point.exact

@@ -24,7 +24,7 @@ from hydraulic_sysid.data.records import Record
 from .errors import SegmentError
 from .noise import noise_std, robust_noise_std, spikes, without
 from .noise_model import ChannelNoise
-from .projection import Nuisance, project_out
+from .projection import Explained, project_out
 from .recording import Reading
 from .saturation import runs
 from .velocity_filter import VelocityFilter
@@ -110,11 +110,11 @@ class Segments:
         return [_STATES.index(c) for c in self.channels]
 
     @cached_property
-    def all_nuisance(self) -> tuple[Array, Nuisance]:
-        """(S, m, K) that of laws and hum and of what low passes held, 0 for priors; and it by itself."""
+    def all_nuisance(self) -> tuple[Array, Explained]:
+        """(S, m, K) that of laws and hum and of what low passes held, 0 for priors; and what it explains by itself."""
         columns = np.concatenate((self.nuisance, self.starts_of_filters), axis=-1)
         columns = np.pad(columns, ((0, 0), (0, len(self.free)), (0, 0)))
-        return columns, Nuisance.of(columns)
+        return columns, Explained.by(columns)
 
     @cached_property
     def drive(self) -> Array:

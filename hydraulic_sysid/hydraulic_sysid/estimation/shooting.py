@@ -119,7 +119,7 @@ class Shooting:
         states, best = list(initial_states), list(before)
         for share in shares:
             moved = self.corrected(initial_states, before, [share * p.raw for p in before])
-            states, best = better((states, best), (moved, self._seen_from(before, plant, moved)))
+            states, best = better_of((states, best), (moved, self._seen_from(before, plant, moved)))
         return states, best
 
     def better(
@@ -127,7 +127,7 @@ class Shooting:
     ) -> tuple[list[Array], list[Projection]]:
         """Of two initial states of every segment those that leave less, in directions that are known."""
         tried = [p.with_raw(r) for p, r in zip(before, self.try_out(plant, one), strict=True)]
-        return better((one, tried), (other, self._seen_from(before, plant, other)))
+        return better_of((one, tried), (other, self._seen_from(before, plant, other)))
 
     def _seen_from(self, before: Sequence[Projection], plant: Plant, states: Sequence[Array]) -> list[Projection]:
         return [p.with_raw(r) for p, r in zip(before, self.residuals(plant, states), strict=True)]
@@ -243,7 +243,7 @@ class Shooting:
         return Projection.of(base, jacobian, *segments.all_nuisance)
 
 
-def better(
+def better_of(
     one: tuple[Sequence[Array], Sequence[Projection]], other: tuple[Sequence[Array], Sequence[Projection]]
 ) -> tuple[list[Array], list[Projection]]:
     """Of two initial states of every segment, and what they leave, those that leave less beyond the nuisance.

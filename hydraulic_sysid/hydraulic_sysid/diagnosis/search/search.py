@@ -8,6 +8,7 @@ Then every effect added is set against what would take its place, so that a prox
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -19,11 +20,11 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.errors import SegmentError
-from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
+from hydraulic_sysid.estimation.fit import Fit, FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.parallel import results
 from hydraulic_sysid.estimation.parameters import Parameters, bounded
 from hydraulic_sysid.estimation.refinement import outlying, refined, usable
-from hydraulic_sysid.estimation.segments import shorter
+from hydraulic_sysid.estimation.segments import Segments, shorter
 
 from .agreement import agreed
 from .candidate_table import candidate_table
@@ -209,14 +210,11 @@ class Search:
         found = self.state(model, self._first if far else self._last)
         if found.misfit.variance - 1.0 < EXPLAINED:
             return found
-        short = found
-        try:
+        best = found
+        with suppress(SimulationError):  # they lead where the plant does not run
             values = self.fitted_to_short_segments(model)
             if self.leads_elsewhere(values, found):
-                short = self.state(values, self._first)
-        except SimulationError:  # they lead where the plant does not run
-            pass
-        best = min(found, short, key=lambda s: s.misfit.total)
+                best = min(found, self.state(values, self._first), key=lambda s: s.misfit.total)
         done = best.misfit.variance >= FAR_OFF or (best is found and not far)
         return best if done else self.state(best.model, self._last)
 
@@ -243,12 +241,16 @@ class Search:
 
     def fitted_to_short_segments(self, model: Model) -> Model:
         """The model with what a first fit to segments a quarter as long gives."""
+        done = self.fitted_to(self.short().some(SHORTER * ENOUGH), model, self._first)
+        return model.with_values(done.values)
+
+    def fitted_to(self, segments: Sequence[Segments], model: Model, settings: FitSettings) -> Fit:
+        """A model, without effects that have no derivative, fitted to these segments."""
         smooth = self._smooth(model)
-        done = fit_segments(
-            Plant.for_fits(smooth), self.short().some(SHORTER * ENOUGH), smooth.movable_keys(), self._first,
+        return fit_segments(
+            Plant.for_fits(smooth), segments, smooth.movable_keys(), settings,
             progress=lambda *_: self.say.left(), priors=self.priors,
         )  # fmt: skip
-        return model.with_values(done.values)
 
     def judged(self, state: SearchState) -> SearchState:
         """A state, judged by the noise that it shows itself."""
@@ -519,10 +521,11 @@ class Search:
         others = [d.key for d in moved if d not in taken]
         without = self.explore(self.with_moved(done, others) if others else strict, LATER_REFITS)
         promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
-        found = []
-        for r in [r for r in without.refits if r.misfit.total < promising][:FULL]:
+        found, near = [], [r for r in without.refits if r.misfit.total < promising][:FULL]
+        most = (1.0 + WORSE_LOOK) * self.left_on_few(done) if near else 0.0
+        for r in near:
             try:
-                if self.looked_at(r.refit.model) > (1.0 + WORSE_LOOK) * self.left_on_few(done):
+                if self.looked_at(r.refit.model) > most:
                     continue
                 reached = self.state(r.refit.model, self._last)
             except SimulationError:
@@ -536,10 +539,7 @@ class Search:
         smooth = self._smooth(model)
         first = settings is self._first
         segments = self.split.some(ENOUGH) if first else self.split.to_fit
-        done = fit_segments(
-            Plant.for_fits(smooth), segments, smooth.movable_keys(), settings or self.settings,
-            progress=lambda *_: self.say.left(), priors=self.priors,
-        )  # fmt: skip
+        done = self.fitted_to(segments, smooth, settings or self.settings)
         states = None if first else done.point.initial_states
         at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors, states)
         if smooth is model:
@@ -574,12 +574,7 @@ class Search:
 
     def looked_at(self, model: Model) -> float:
         """What a fit to a few segments leaves of them."""
-        smooth = self._smooth(model)
-        done = fit_segments(
-            Plant.for_fits(smooth), self.split.some(LOOK), smooth.movable_keys(), self._last,
-            progress=lambda *_: self.say.left(), priors=self.priors,
-        )  # fmt: skip
-        return done.cost
+        return self.fitted_to(self.split.some(LOOK), model, self._last).cost
 
     def left_on_few(self, state: SearchState) -> float:
         """What a state leaves of the same segments."""
@@ -702,12 +697,8 @@ class Search:
         found = []
         for r in [*near, *others[:OTHERS]]:
             self.say(f"setting {r.name} against effects of other subsystems")
-            model = self._smooth(r.refit.model)
             try:
-                done = fit_segments(
-                    Plant.for_fits(model), self.split.some(ENOUGH), model.movable_keys(), self._few,
-                    progress=lambda *_: self.say.left(), priors=self.priors,
-                )  # fmt: skip
+                done = self.fitted_to(self.split.some(ENOUGH), r.refit.model, self._few)
             except SimulationError:
                 continue
             fitted = replace(r.refit, model=r.refit.model.with_values(done.values))
