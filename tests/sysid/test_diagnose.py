@@ -380,9 +380,16 @@ def held_numbers(off: Sequence[float], correlation: float = 0.0) -> HeldNumbers:
 def test_no_more_numbers_move_than_have_to() -> None:
     held = held_numbers([30.0, 1.0, 12.0])
     assert held.cost(["a", "b", "c"]) == 0.0 and held.cost(["a"]) == pytest.approx(1.0 + 144.0)
-    assert next(held.fewest(200.0)) == ("a",)
-    assert list(held.fewest(100.0)) == [("a", "c"), ("a", "b", "c")]
-    assert list(held_numbers([1.0, 1.0]).fewest(100.0))[0] == ()
+    assert next(held.fewest(200.0, 200.0)) == ("a",)
+    assert list(held.fewest(100.0, 100.0)) == [("a", "c"), ("a", "b", "c")]
+    assert list(held_numbers([1.0, 1.0]).fewest(100.0, 100.0))[0] == ()
+
+
+def test_fewer_numbers_come_first_where_the_quadratic_may_be_wrong() -> None:
+    """But of those that cost too much, only what costs clearly less than the one before."""
+    held = held_numbers([30.0, 1.0, 12.0])
+    assert list(held.fewest(100.0, 1000.0)) == [("a",), ("a", "c"), ("a", "b", "c")]
+    assert list(held_numbers([20.0, 20.0, 20.0]).fewest(10.0, 2000.0)) == [(), ("a", "b"), ("a", "b", "c")]
 
 
 def test_a_number_at_its_bound_has_the_error_that_it_has_beside_the_others() -> None:
@@ -395,7 +402,7 @@ def test_of_numbers_that_say_the_same_either_may_move() -> None:
     """Only their difference is known well, as of two areas with the valve's flow free."""
     held = held_numbers([3.0, -3.0], correlation=0.999)
     assert held.cost([]) == pytest.approx(18e3)
-    assert next(held.fewest(100.0)) == ("a",)
+    assert next(held.fewest(100.0, 100.0)) == ("a",)
     assert held.instead("a", ["a"], 100.0) == [("b",)]
     assert held_numbers([30.0, 1.0]).instead("a", ["a"], 100.0) == []
 

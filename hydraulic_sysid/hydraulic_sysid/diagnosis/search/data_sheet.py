@@ -170,13 +170,17 @@ class HeldNumbers:
         correlation = self.cover[np.ix_(held, held)] / np.outer(scale, scale)
         return float(off / scale @ np.linalg.pinv(correlation, hermitian=True) @ (off / scale)) if held else 0.0
 
-    def fewest(self, enough: float) -> Iterator[tuple[str, ...]]:
-        """The fewest numbers that have to move for the others to cost less than ``enough``, then one more each time."""
-        found = False
+    def fewest(self, enough: float, perhaps: float) -> Iterator[tuple[str, ...]]:
+        """The fewest numbers that have to move for the others to cost less than ``perhaps``, then more and more.
+
+        The quadratic may be far off, as where a piston meets its stop: until one costs less than ``enough``, each set
+        costs less than half of the one before.
+        """
+        before = 2.0 * perhaps
         for size in range(len(self.keys) + 1):
             best = min(combinations(self.keys, size), key=self.cost)
-            found = found or self.cost(best) < enough
-            if found:
+            if self.cost(best) < max(enough, 0.5 * before):
+                before = self.cost(best)
                 yield best
 
     def deviation(self, key: str, moved: Collection[str], value: float) -> Deviation:

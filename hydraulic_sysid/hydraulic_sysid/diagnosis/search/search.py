@@ -90,7 +90,7 @@ SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
 BEYOND = 8  # values of a number that lay at its bound, over all where it may go, from which a fit may begin
 SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one
-CLEAR = 10.0  # times what names a number, beyond which a fit need not show what putting it back costs
+CLEAR = 10.0  # times what names a number, beyond which a fit need not show what keeping it costs
 QUIETER = 0.95  # of the noise before: what was judged by that is judged again
 RETIMED = 0.03  # sampling intervals by which a channel is less late than before: the same
 MOST_FAULTS = 3  # of the recording
@@ -446,7 +446,7 @@ class Search:
         held = HeldNumbers.of(final.linearisation, self.given)
         enough = least_cost(final.misfit.count, final.misfit.variance)
         # Far from the file's values the quadratic says little: the data sheet as it is comes first, fitted.
-        for moved in chain([()], filter(None, held.fewest(enough))):
+        for moved in chain([()], filter(None, held.fewest(enough, CLEAR * enough))):
             done = strict if strict is not None and not moved else self.with_moved(final, moved)
             if done.misfit.total - final.misfit.total <= enough:
                 break
