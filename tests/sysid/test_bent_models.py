@@ -13,10 +13,13 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
 from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, priors
-from hydraulic_sysid.diagnosis.search.holdout import split
+from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit
 from hydraulic_sysid.diagnosis.search.score_test import score
+from hydraulic_sysid.diagnosis.search.search import retimed
+from hydraulic_sysid.estimation.noise_model import ChannelNoise
+from hydraulic_sysid.estimation.recording import Reading
 
 DT, SECONDS = 1e-3, 6.0
 CAPACITY = 2e-14  # m³/Pa, a twenty-fifth of what the library takes a hose for
@@ -58,3 +61,17 @@ def test_sizes_that_are_shares_are_known_beforehand_to_be_small(model: Model) ->
     assert (mean, std) == (1.0, pytest.approx(PLAUSIBLE * (scale.default - 1.0)))
     assert "sensor_scale.scale" not in priors(model.with_effect("sensor_scale"))  # its file's own
     assert not any(key.startswith(("coulomb_friction.", "hose_compliance.")) for key in known)  # sizes of the plant
+
+
+def late(at: Split, by: float) -> Split:
+    """The positions of all records as much late [s]."""
+    return replace(at, segments=[replace(s, readings=(Reading(by), *s.readings[1:])) for s in at.segments])
+
+
+def test_a_delay_that_the_noise_hides_asks_for_no_other_judgement(model: Model) -> None:
+    """Where a sensor is noisy, a delay of a few microseconds creeps from fit to fit and means nothing."""
+    seen = split([swept(model)], [], model, 0.5)
+    deaf = replace(seen, segments=[s.with_noise([ChannelNoise.white(1e-3)] * 3) for s in seen.segments])
+    for split_, means in ((seen, True), (deaf, False)):
+        assert retimed(split_, late(split_, 0.2 * DT)) is means
+        assert not retimed(split_, late(split_, 0.01 * DT))

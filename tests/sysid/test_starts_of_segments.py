@@ -13,6 +13,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
+from hydraulic_sysid.estimation.known_starts import KnownStarts
 from hydraulic_sysid.estimation.segments import Segments, cut
 from hydraulic_sysid.estimation.shooting import Shooting
 
@@ -118,6 +119,22 @@ def test_a_segment_that_begins_far_off_alone_finds_its_way(model: Model, segment
     assert away.unstuck().cost < 1.001 * at.cost
     others = np.arange(len(states)) != 7
     assert np.array_equal(away.unstuck().initial_states[0][others], states[others])
+
+
+def test_a_fit_begins_where_the_last_one_ended(model: Model, segments: list[Segments]) -> None:
+    """Where that leaves less than what the record shows of the beginning; so, too, of some of the segments."""
+    plant = Plant.for_fits(model)
+    begin, starts = FitPoint.begin(plant, segments, ()), KnownStarts()
+    fitted = begin.at_rest()
+    starts.keep(segments, fitted.initial_states)
+    assert fitted.cost < 0.9999 * begin.cost
+    assert FitPoint.begin(plant, segments, (), starts=starts).cost <= fitted.cost * (1.0 + 1e-9)
+    every_other = [segments[0].subset(np.arange(len(segments[0])) % 2 == 0)]
+    some = FitPoint.begin(plant, every_other, (), starts=starts)
+    assert some.cost <= sum(fitted.costs[0][::2]) * (1.0 + 1e-9)
+    wrong = KnownStarts()
+    wrong.keep(segments, [fitted.initial_states[0] + 1.0])
+    assert FitPoint.begin(plant, segments, (), starts=wrong).cost == begin.cost
 
 
 def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(

@@ -19,6 +19,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 
 from .errors import CalibrationError
+from .known_starts import KnownStarts
 from .levenberg_marquardt import Minimum, NormalEquations, minimise
 from .parallel import results
 from .parameters import NO_PRIORS, Parameters, Priors
@@ -82,12 +83,18 @@ class FitPoint:
         keys: Sequence[str],
         robust: bool = False,
         priors: Priors = NO_PRIORS,
+        starts: KnownStarts | None = None,
     ) -> FitPoint:
-        """A model as it is, initial states moved once to where they fit best."""
+        """A model as it is, initial states moved once to where they fit best.
+
+        :param starts: from where they are moved, where that leaves less than where the records show them
+        """
         shooting = Shooting(plant, segments)
         point = cls(shooting, Parameters.of(plant.model, keys, priors), shooting.initial_states, [], robust)
+        if starts is not None:
+            point = replace(point, initial_states=shooting.nearer(plant, starts.of(segments, shooting.initial_states)))
         if any(s.unmeasured_pressures.any() for s in segments):
-            raw = shooting.residuals(point.plant, shooting.initial_states)
+            raw = shooting.residuals(point.plant, point.initial_states)
             shooting = replace(shooting, misfit=_misfit(segments, raw))
         return point.settled(shooting, point.parameters)
 
@@ -354,8 +361,9 @@ def fit_segments(
     settings: FitSettings,
     progress: Callable[[int, float], object] | None = None,
     priors: Priors = NO_PRIORS,
+    starts: KnownStarts | None = None,
 ) -> Fit:
-    """As `fit`, to segments that were cut before, with what is known of parameters beforehand."""
+    """As `fit`, to segments that were cut before, with what is known of parameters and initial states beforehand."""
 
     def accepted(number: int, point: FitPoint) -> FitPoint:
         if progress is not None:
@@ -363,7 +371,7 @@ def fit_segments(
         again = point.reweighted()
         return again if again is not point else point.with_new_directions(_OUTDATED)
 
-    begin = FitPoint.begin(plant, segments, keys, settings.robust, priors)
+    begin = FitPoint.begin(plant, segments, keys, settings.robust, priors, starts)
     if not keys:
         return Fit(begin.at_rest(), True, 0)
     steps = 0

@@ -19,6 +19,13 @@ def project_out(basis: Array, values: Array) -> Array:
     return values - basis @ (np.swapaxes(basis, -1, -2) @ values)
 
 
+def squares(left: Array) -> Array:
+    """(S,) sum of squares of each segment of (S, m, 1), infinite where a run has left all bounds."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = np.sum(left**2, axis=(1, 2))
+    return np.where(np.isfinite(found), found, np.inf)
+
+
 @dataclass(frozen=True)
 class Explained:
     """What linear unknowns explain of each segment: the share ``taken`` (S, F) of orthonormal ``basis`` (S, m, F).
@@ -113,8 +120,7 @@ class Projection:
         Infinite where a run leaves all bounds.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            found = np.sum(self.by_nuisance.beyond(self.raw[..., None]) ** 2, axis=(1, 2))
-        return np.where(np.isfinite(found), found, np.inf)
+            return squares(self.by_nuisance.beyond(self.raw[..., None]))
 
     def beyond(self, columns: Array) -> Array:
         """What of (S, m, P) the initial states and the nuisance cannot explain."""

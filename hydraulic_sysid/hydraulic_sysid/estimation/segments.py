@@ -142,6 +142,13 @@ class Segments:
         """(S,) how many measured values count in each segment."""
         return np.sum(~self.outliers, axis=(1, 2))
 
+    @cached_property
+    def timing(self) -> Array:
+        """(C,) by how much a delay of a channel changes all that is recorded of it, over the noise, squared [1/s²]."""
+        rate = np.gradient(self.smoothed[:, self.states], self.record.dt, axis=0)
+        inside = self.first[:, None] + np.arange(self.samples)
+        return np.asarray(np.sum((rate[inside] / self.noise_std) ** 2, axis=(0, 1)))
+
     def deviation(self, run: Array, priors: Array) -> Array:
         """(S, m) measured − what a simulated ``run`` (S, samples, C) looks like in the record, whitened.
 

@@ -15,7 +15,7 @@ from hydraulic_sim.plant import Plant
 
 from .parallel import results
 from .parameters import Parameters
-from .projection import Projection
+from .projection import Projection, squares
 from .segments import Segments
 
 T = TypeVar("T")
@@ -78,6 +78,15 @@ class Shooting:
     def initial_states(self) -> list[Array]:
         """As the records show them."""
         return [s.initial_states(self.plant) for s in self.segments]
+
+    def nearer(self, plant: Plant, other: Sequence[Array]) -> list[Array]:
+        """Of `initial_states` and another set of them those that leave less beyond the nuisance, in each segment."""
+        own, new = (self._left(self.residuals(plant, states)) for states in (self.initial_states, other))
+        pairs = zip(self.initial_states, other, own, new, strict=True)
+        return [np.where((b < a)[:, None], changed, states) for states, changed, a, b in pairs]
+
+    def _left(self, raw: Sequence[Array]) -> list[Array]:
+        return [squares(s.all_nuisance[1].beyond(r[..., None])) for s, r in zip(self.segments, raw, strict=True)]
 
     def try_out(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
         """The `residuals` of another plant.

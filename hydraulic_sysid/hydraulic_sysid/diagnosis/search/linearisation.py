@@ -12,6 +12,7 @@ from hydraulic_sim.arrays import Array, Mask
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.fit import FitPoint
+from hydraulic_sysid.estimation.known_starts import KnownStarts
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parameters import NO_PRIORS, Parameters, Priors
 
@@ -32,20 +33,11 @@ class Linearisation:
 
     @classmethod
     def of(
-        cls, model: Model, split: Split, priors: Priors = NO_PRIORS, fitted: Sequence[Array] | None = None
+        cls, model: Model, split: Split, priors: Priors = NO_PRIORS, starts: KnownStarts | None = None
     ) -> Linearisation:
-        """Of a model that was fitted before.
-
-        :param fitted: initial states (S_i, n_states) that the segments for fitting were fitted with, of every record
-            that has such
-        """
+        """Of a model that was fitted before, from initial states that are known."""
         plant, keys = Plant.for_fits(model), model.movable_keys()
-        point = FitPoint.begin(plant, split.segments, keys, priors=priors)
-        if fitted is not None:
-            part = point.subset(split.fit)
-            part = part.better_of(part.settled(part.shooting, part.parameters, fitted))
-            point = point.with_subset(split.fit, part)
-        return cls(model, split, point.at_rest())
+        return cls(model, split, FitPoint.begin(plant, split.segments, keys, priors=priors, starts=starts).at_rest())
 
     @property
     def columns(self) -> list[Array]:

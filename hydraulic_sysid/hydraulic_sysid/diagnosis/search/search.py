@@ -21,6 +21,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import Fit, FitPoint, FitSettings, fit_segments
+from hydraulic_sysid.estimation.known_starts import KnownStarts
 from hydraulic_sysid.estimation.parallel import results
 from hydraulic_sysid.estimation.parameters import Parameters, bounded
 from hydraulic_sysid.estimation.refinement import outlying, refined, usable
@@ -45,7 +46,7 @@ from .errors import DiagnosisError
 from .frozen_jacobian import refit, refit_rounded
 from .holdout import MOST_VALUES, Split, split
 from .linearisation import Linearisation
-from .misfit import Misfit, explained, material, misfit
+from .misfit import SIGNIFICANT, Misfit, explained, material, misfit
 from .progress import OutOfTimeError, Progress, Watch
 from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import immaterial, negligible, remainders
@@ -135,6 +136,7 @@ class Search:
         self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
         self._seen: dict[frozenset[str], list[CandidateScore]] = {}
         self._judged_with: set[str] = set()
+        self._starts: dict[frozenset[str], KnownStarts] = {}
         self.priors = priors(model)
         self._first = replace(settings, least_gain=FIRST_GAIN)
         self._few = replace(settings, most_steps=FEW_STEPS, least_gain=FEW_GAIN)
@@ -249,7 +251,7 @@ class Search:
         smooth = self._smooth(model)
         return fit_segments(
             Plant.for_fits(smooth), segments, smooth.movable_keys(), settings,
-            progress=lambda *_: self.say.left(), priors=self.priors,
+            progress=lambda *_: self.say.left(), priors=self.priors, starts=self.starts(smooth),
         )  # fmt: skip
 
     def judged(self, state: SearchState) -> SearchState:
@@ -537,15 +539,28 @@ class Search:
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
         smooth = self._smooth(model)
-        first = settings is self._first
-        segments = self.split.some(ENOUGH) if first else self.split.to_fit
+        segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
         done = self.fitted_to(segments, smooth, settings or self.settings)
-        states = None if first else done.point.initial_states
-        at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors, states)
+        starts = self._starts.pop(frozenset(smooth.effects), KnownStarts())
+        starts.keep(segments, done.point.initial_states)
+        at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors, starts)
+        left = misfit(self.split, at.costs, at.parameters.prior_cost)
+        if left.variance < FAR_OFF:  # else they are bent to what the model lacks
+            starts.keep(self.split.segments, at.point.initial_states)
+            self._starts[frozenset(smooth.effects)] = starts
         if smooth is model:
-            return SearchState(at.model, at, misfit(self.split, at.costs, at.parameters.prior_cost), at.residual)
+            return SearchState(at.model, at, left, at.residual)
         seen = refit_rounded(at, _with_values(model, at.model))
         return SearchState(seen.model, at, misfit(self.split, seen.costs, self.prior_cost(seen.model)), seen.residual)
+
+    def starts(self, smooth: Model) -> KnownStarts | None:
+        """Initial states that were fitted with a model's effects, or with the most of them and no others.
+
+        Those of models that are not `FAR_OFF`.
+        """
+        effects = frozenset(smooth.effects)
+        known = [own for own in self._starts if own <= effects]
+        return self._starts[max(known, key=len)] if known else None
 
     def prior_cost(self, model: Model) -> float:
         """What a model's values cost by what was known of them beforehand."""
@@ -580,7 +595,9 @@ class Search:
         """What a state leaves of the same segments."""
         model = self._smooth(state.model)
         few = self.split.some(LOOK)
-        return FitPoint.begin(Plant.for_fits(model), few, model.movable_keys(), priors=self.priors).at_rest().cost
+        keys = model.movable_keys()
+        starts = self.starts(model)
+        return FitPoint.begin(Plant.for_fits(model), few, keys, priors=self.priors, starts=starts).at_rest().cost
 
     def with_filed_values(self, model: Model) -> Model:
         """A model with the values of the model file, where that has them."""
@@ -944,12 +961,16 @@ def quieter(before: Split, after: Split) -> bool:
 
 
 def retimed(before: Split, after: Split) -> bool:
-    """Whether the small delay of any channel has turned out to be another: an effect may only have undone it."""
-    return any(
-        abs(n.delay - o.delay) > RETIMED * new.record.dt
-        for new, old in zip(after.segments, before.segments, strict=True)
-        for n, o in zip(new.readings, old.readings, strict=True)
-    )
+    """Whether the small delay of any channel has turned out to be another: an effect may only have undone it.
+
+    It must change more of what is recorded than the noise hides.
+    """
+    changed = dict.fromkeys(after.channels, 0.0)
+    for new, old in zip(after.segments, before.segments, strict=True):
+        for c, (n, o) in enumerate(zip(new.readings, old.readings, strict=True)):
+            if abs(n.delay - o.delay) > RETIMED * new.record.dt:
+                changed[new.channels[c]] += (n.delay - o.delay) ** 2 * float(new.timing[c])
+    return max(changed.values()) > SIGNIFICANT
 
 
 def varied(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
