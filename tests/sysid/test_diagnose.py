@@ -160,7 +160,8 @@ def test_a_parameter_whose_value_and_default_are_zero_has_a_scale(model) -> None
 def state(model, total: float, refits: dict[str, float]) -> SearchState:
     """A state with that sum of squares, and those of its refits."""
     found = [CandidateRefit(name, None, at(left)) for name, left in refits.items()]  # type: ignore[arg-type]
-    return SearchState(model, None, at(total), [], found)  # type: ignore[arg-type]
+    nowhere = SimpleNamespace(split=Split([], []))
+    return SearchState(model, nowhere, at(total), [], found)  # type: ignore[arg-type]
 
 
 def noisy(noise: float) -> Split:
@@ -237,6 +238,15 @@ def test_where_nothing_need_be_missing_an_effect_must_explain_what_is_left(model
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     assert bool(decisive(found).added) is named
     assert decisive(found).final is (final if named else base)
+
+
+@pytest.mark.parametrize(("after", "named"), [(60.0, False), (10.0, True)])
+def test_an_effect_that_leaves_most_of_what_is_nothing_to_anybody_is_not_named(model, after, named) -> None:
+    """Sensors may show a hundred times their noise that is a thousandth of the motion."""
+    base, final = state(model, 3000 * 107.0, {}), state(model.with_effect("constant_load"), 3000 * after, {})
+    base.__dict__["immaterial"] = True
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
+    assert bool(decisive(found).added) is named
 
 
 @pytest.mark.parametrize(

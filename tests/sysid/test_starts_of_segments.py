@@ -127,7 +127,6 @@ def test_a_fit_begins_where_the_last_one_ended(model: Model, segments: list[Segm
     begin, starts = FitPoint.begin(plant, segments, ()), KnownStarts()
     fitted = begin.at_rest()
     starts.keep(segments, fitted.initial_states)
-    assert fitted.cost < 0.9999 * begin.cost
     assert FitPoint.begin(plant, segments, (), starts=starts).cost <= fitted.cost * (1.0 + 1e-9)
     every_other = [segments[0].subset(np.arange(len(segments[0])) % 2 == 0)]
     some = FitPoint.begin(plant, every_other, (), starts=starts)

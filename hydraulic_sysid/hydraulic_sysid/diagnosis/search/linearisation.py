@@ -35,9 +35,13 @@ class Linearisation:
     def of(
         cls, model: Model, split: Split, priors: Priors = NO_PRIORS, starts: KnownStarts | None = None
     ) -> Linearisation:
-        """Of a model that was fitted before, from initial states that are known."""
+        """Of a model that was fitted before: each segment from where that leaves less, ``starts`` or the record."""
         plant, keys = Plant.for_fits(model), model.movable_keys()
-        return cls(model, split, FitPoint.begin(plant, split.segments, keys, priors=priors, starts=starts).at_rest())
+        point = FitPoint.begin(plant, split.segments, keys, priors=priors)
+        if starts is not None:
+            known = starts.of(split.segments, point.shooting.initial_states)
+            point = point.better_of(point.settled(point.shooting, point.parameters, known))
+        return cls(model, split, point.at_rest())
 
     @property
     def columns(self) -> list[Array]:

@@ -125,8 +125,7 @@ def misfit(split: Split, costs: Sequence[Array], prior: float = 0.0) -> Misfit:
 def material(before: Misfit, after: Misfit) -> bool:
     """Whether a reduction is more than chance, more than fitting itself gives, and enough to be seen.
 
-    It must be so without the few segments that gain most and those that lose most, too; and with them validation data
-    must not be left worse, or nobody would believe it.
+    It must be so without the few segments that gain most and those that lose most, too.
     """
     gain, fit, validation = before.total - after.total, before.fit - after.fit, before.validation - after.validation
     if _comparable(before, after):
@@ -135,9 +134,7 @@ def material(before: Misfit, after: Misfit) -> bool:
         gain = float(np.sort(gains)[few : gains.size - few].sum())
         kept = _but_the_worst(after.by_segment, after.counted)
         fit, validation = (float(gains[kept][part[kept]].sum()) for part in (after.fitted, ~after.fitted))
-    held = not before.n_validation or (
-        validation > CONFIRMED * before.variance and after.validation < before.validation
-    )
+    held = not before.n_validation or validation > CONFIRMED * before.variance
     return gain >= before.least and held and fit > SIGNIFICANT * before.variance
 
 

@@ -19,7 +19,7 @@ from .holdout import Split
 from .linearisation import Linearisation
 from .misfit import Misfit, unexplained_share
 from .recording_faults import RecordingFault
-from .remainder import Remainder, Spikes, remainders, spikes
+from .remainder import Remainder, Spikes, immaterial, remainders, spikes
 from .score_test import CandidateScore
 from .whiteness import Whiteness, whiteness
 
@@ -47,6 +47,11 @@ class SearchState:
     residual: Sequence[Array]
     refits: list[CandidateRefit] = field(default_factory=list)
     scores: list[CandidateScore] = field(default_factory=list)
+
+    @cached_property
+    def immaterial(self) -> bool:
+        """Whether what is left is nothing to anybody."""
+        return immaterial(self.misfit, remainders(self.linearisation.split, self.residual))
 
     def others(self, name: str) -> list[CandidateRefit]:
         """The refits with another effect than this one."""

@@ -99,9 +99,13 @@ def anything(name: str, after: Misfit, part: float) -> bool:
     return True
 
 
-def leaves_most(before: Misfit, after: Misfit) -> bool:
-    """Whether so little was left before that nothing need be missing, and much of that still is."""
-    return before.little and after.usual - 1.0 > max(SMALL_UNEXPLAINED * (before.variance - 1.0), NOTHING_LEFT)
+def leaves_most(before: Misfit, after: Misfit, nothing: bool = False) -> bool:
+    """Whether nothing need be missing, and much of what was left before still is.
+
+    So little is left that it may be the noise, or, whatever the sensors show, it is ``nothing`` to anybody.
+    """
+    left = max(SMALL_UNEXPLAINED * (before.usual - 1.0 if nothing else before.variance - 1.0), NOTHING_LEFT)
+    return (before.little or nothing) and after.usual - 1.0 > left
 
 
 def nothing_gained(before: Misfit, after: Misfit) -> bool:
@@ -118,7 +122,7 @@ def decisive(found: SearchResult) -> SearchResult:
     another subsystem: that is how far laws are off those of the bench.
     """
     base, final = found.base.misfit, found.final.misfit
-    if found.added and (nothing_gained(base, final) or leaves_most(base, final)):
+    if found.added and (nothing_gained(base, final) or leaves_most(base, final, found.base.immaterial)):
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
         if needless(found, name) or vague(found, name):
