@@ -27,6 +27,7 @@ from pathlib import Path
 
 from hidden_effects import benches, family, matrix
 from hydraulic_sysid import campaign
+from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_VALUES
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "diagnosis-matrix.md"
@@ -47,10 +48,13 @@ def main(argv: list[str] | None = None) -> int:
     where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
     parser.add_argument("--out", type=Path, default=OUT, help="folder of the outcomes")
     parser.add_argument("--no-reference", action="store_true", help="skip the refits of the true structures (faster)")
+    parser.add_argument("--quick", action="store_true", help="as `diagnose --quick` answers; into a folder of its own")
     parser.add_argument("--report-only", action="store_true", help="examine nothing, report what is in the folder")
     parser.add_argument("--doc", action="store_true", help=f"write {PAGE.relative_to(ROOT)}")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the benches instead of diagnosing them")
     options = parser.parse_args(argv)
+    if options.quick and options.doc:
+        parser.error("--doc: the page is of full diagnoses, not of --quick")
     if options.family:
         drawn = family.draw(options.count, options.seed or [1], options.what)
         chosen = matrix.narrowed(drawn, options.kind, options.severity, options.only)
@@ -65,7 +69,9 @@ def main(argv: list[str] | None = None) -> int:
         found = [d for d in matrix.kept(options.out) if d["answer"]["name"] in names]
     else:
         crew = campaign.dask_cluster(options.scheduler) if options.scheduler else campaign.processes(options.processes)
-        found = matrix.run(chosen, options.out, crew, not (options.no_reference or options.family))
+        reference = not (options.no_reference or options.family or options.quick)
+        most_values = QUICK_VALUES if options.quick else MOST_VALUES
+        found = matrix.run(chosen, options.out, crew, reference, most_values)
     if not found:
         print("nothing was examined yet")
         return 1

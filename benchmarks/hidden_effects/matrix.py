@@ -15,6 +15,7 @@ from typing import Any
 
 from hydraulic_sysid import campaign
 from hydraulic_sysid.campaign.outcome import CASES
+from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES
 
 from . import benches, catalogue, family, scoring
 
@@ -34,9 +35,9 @@ def version() -> str:
     return digest.hexdigest()[:12]
 
 
-def examine(bench: benches.Bench, reference: bool = True) -> dict[str, Any]:
+def examine(bench: benches.Bench, reference: bool = True, most_values: int = MOST_VALUES) -> dict[str, Any]:
     """Make the bench, let it be diagnosed, and (``reference``) measure on records that the diagnosis never saw how
-    far it came, beside the true structure."""
+    far it came, beside the true structure. No more than ``most_values`` measured values are used."""
     from hydraulic_sim.model_file import load_model
     from hydraulic_sysid.data.records import read_all
     from hydraulic_sysid.data.results import plain
@@ -53,7 +54,7 @@ def examine(bench: benches.Bench, reference: bool = True) -> dict[str, Any]:
     found: dict[str, Any] = {"version": version(), "answer": answer}
     begin, busy = time.perf_counter(), time.process_time()
     try:
-        diagnosis = diagnose(model, records)
+        diagnosis = diagnose(model, records, most_values=most_values)
         found |= {"seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - busy}
         found["peak_MiB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         found["result"] = plain(diagnosis.result)
@@ -127,14 +128,23 @@ def narrowed(
     ]
 
 
-def run(chosen: list[benches.Bench], folder: Path, crew: campaign.Crew, reference: bool = True) -> list[dict[str, Any]]:
+def run(
+    chosen: list[benches.Bench],
+    folder: Path,
+    crew: campaign.Crew,
+    reference: bool = True,
+    most_values: int = MOST_VALUES,
+) -> list[dict[str, Any]]:
     """What is found for these benches, examined unless the folder has it of this state of the code; judged anew.
 
     The order is a shuffled one, so that a run that is ended early has seen a fair part of the catalogue.
     """
     now = version()
     cases = [
-        campaign.Case(campaign.digest([b.name, now, reference]), {"bench": b.name}, (b, reference)) for b in chosen
+        campaign.Case(
+            campaign.digest([b.name, now, reference, most_values]), {"bench": b.name}, (b, reference, most_values)
+        )
+        for b in chosen
     ]
     shuffled = sorted(cases, key=lambda case: case.key)
     outcomes = {o.key: o for o in campaign.run(examined, shuffled, folder, crew, _told)}
@@ -145,7 +155,7 @@ def run(chosen: list[benches.Bench], folder: Path, crew: campaign.Crew, referenc
     return [_judged(dict(outcome.row), b.answer()) for outcome, b in found if not outcome.failed]
 
 
-def examined(argument: tuple[benches.Bench, bool], place: Path) -> dict[str, Any]:
+def examined(argument: tuple[benches.Bench, bool, int], place: Path) -> dict[str, Any]:
     """The work of the campaign."""
     return examine(*argument)
 

@@ -14,17 +14,18 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict, worth
+from hydraulic_sysid.diagnosis.search.candidate_fits import varied
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, HeldNumbers, as_filed, relaxed
 from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
-from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material
+from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material, reduction
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
 from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError, Progress
 from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, RecordingFault
 from hydraulic_sysid.diagnosis.search.score_test import CandidateScore
-from hydraulic_sysid.diagnosis.search.search import Search, varied
+from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
 from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
 from hydraulic_sysid.diagnosis.search.worth import absorbs_discrepancy, decisive, without_competitor
@@ -493,6 +494,7 @@ def test_no_single_segment_turns_what_counts() -> None:
     assert material(start, by_segment(worse)) and explained(start, by_segment(worse)) == pytest.approx(1.0)
     lost = [20_000.0 if i == wild else c for i, c in enumerate(after)]  # more than all others gain
     assert material(by_segment(before), by_segment(lost))
+    assert reduction(by_segment(before), by_segment(lost)) == pytest.approx(38 * 100.0)
     alone = by_segment([1000.0 if i == wild else c for i, c in enumerate(before)])
     assert not material(start, alone)  # one segment that gains is no effect either
 

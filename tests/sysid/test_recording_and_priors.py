@@ -17,8 +17,8 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search.holdout import Split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit
 from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, Hypothesis, RecordingFault
+from hydraulic_sysid.diagnosis.search.recording_fits import together
 from hydraulic_sysid.diagnosis.search.remainder import Remainder, immaterial
-from hydraulic_sysid.diagnosis.search.search import together
 from hydraulic_sysid.diagnosis.search.set_aside import accidents
 from hydraulic_sysid.diagnosis.search.verdict import set_aside_sentences
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments

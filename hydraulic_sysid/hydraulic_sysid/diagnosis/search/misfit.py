@@ -127,15 +127,22 @@ def material(before: Misfit, after: Misfit) -> bool:
 
     It must be so without the few segments that gain most and those that lose most, too.
     """
-    gain, fit, validation = before.total - after.total, before.fit - after.fit, before.validation - after.validation
+    gain, fit, validation = reduction(before, after), before.fit - after.fit, before.validation - after.validation
     if _comparable(before, after):
         gains = before.by_segment - after.by_segment
-        few = _few(gains)
-        gain = float(np.sort(gains)[few : gains.size - few].sum())
         kept = _but_the_worst(after.by_segment, after.counted)
         fit, validation = (float(gains[kept][part[kept]].sum()) for part in (after.fitted, ~after.fitted))
     held = not before.n_validation or validation > CONFIRMED * before.variance
     return gain >= before.least and held and fit > SIGNIFICANT * before.variance
+
+
+def reduction(before: Misfit, after: Misfit) -> float:
+    """By how much a model leaves less, without the few segments that gain most and those that lose most."""
+    if not _comparable(before, after):
+        return before.total - after.total
+    gains = before.by_segment - after.by_segment
+    few = _few(gains)
+    return float(np.sort(gains)[few : gains.size - few].sum())
 
 
 def explained(before: Misfit, after: Misfit) -> float:

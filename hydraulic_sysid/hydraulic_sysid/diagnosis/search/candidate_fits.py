@@ -1,0 +1,182 @@
+"""Candidate effects on a fitted model: scored, refitted by a frozen Jacobian, and the nearest fitted to the end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sysid.estimation.parallel import results
+
+from .candidate_table import candidate_table
+from .candidates import candidates, delays, observed, subsystem
+from .fitting import ENOUGH, Fitting, Task, with_fitted_values, without_derivative
+from .frozen_jacobian import refit, refit_rounded
+from .linearisation import Linearisation
+from .misfit import misfit
+from .score_test import CandidateScore, score
+from .search_state import CandidateRefit, SearchState
+from .spectral_lines import record_features
+from .worth import FAR, NOTHING_LEFT, PROMISES, Enough
+
+PROMISING = 0.04  # of the best predicted reduction, from which a candidate is refitted
+MOST_REFITS = 8
+LATER_REFITS = 4  # once something was added, …
+ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
+FULL = 2  # candidates that are refitted from more than one start, and with all sensitivities taken anew
+OTHERS = 3  # candidates of other subsystems, that are set against those where the data sheet is bent to its bounds
+NEAR = 0.93  # of the best reduction, from which a refit is finished
+PROMISED = 0.5  # of what an effect must explain, or of what a number explains, which must show for a fit to its end
+
+
+class CandidateFits(Fitting):
+    """Fits, and what each candidate effect would explain."""
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
+        """The state that candidates were refitted on last, with these refits."""
+        self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
+        self._seen: dict[frozenset[str], list[CandidateScore]] = {}
+
+    def scores(self, state: SearchState) -> list[CandidateScore]:
+        """All candidates on a state, the best first."""
+        at = state.linearisation
+        if self._scored is None or self._scored[0] is not at:
+            self._scored = at, score(at, candidates(state.model), record_features(at))
+            self._seen[frozenset(state.model.effects)] = self._scored[1]
+        return self._scored[1]
+
+    def nothing_left(self, state: SearchState) -> bool:
+        """Whether a model leaves the noise alone, and no candidate promises to take anything off it.
+
+        A noise estimated from what the model leaves has the small effects that it lacks in it.
+        """
+        if state.misfit.variance - 1.0 >= NOTHING_LEFT:
+            return False
+        self.say("looking for what may pass for noise")
+        least = PROMISES * state.misfit.least
+        return not any(s.reduction > least and not observed(s.effect) for s in self.scores(state))
+
+    def within_a_sample(self, tried: CandidateRefit) -> bool:
+        """Whether an effect only delays, by less than a sampling interval: sound sensors and loggers do so, too."""
+        return delays(self.given.library[tried.name], tried.refit.model.value, self.split.interval)
+
+    def explore(self, base: SearchState, most: int = MOST_REFITS, anew: bool = True) -> SearchState:
+        """Score all candidates on a state and refit the best; not ``anew``: by the scores beside the same effects."""
+        at = base.linearisation
+        known = None if anew else self._seen.get(frozenset(base.model.effects))
+        scores = self.scores(base) if known is None else known
+        if not scores:
+            return base
+        least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)
+        # What rounding explains shows once the initial states have settled with it.
+        worth = [s for s in scores if s.reduction > least or observed(s.effect)]
+        best = varied(worth, ALIKE if most < MOST_REFITS else most)[:most]
+        every: list[CandidateRefit] = []
+        self.tried = (base, every)
+        self._show(base, scores, every)
+        for found in self.refitted(base, best):
+            every.append(found)
+            self.say.reached(self._added(every[-1].refit.model), every[-1].misfit)
+            self._show(base, scores, every)
+        pairs = zip(every, best, strict=True)
+        refits = [r for r, s in pairs if not observed(s.effect) or base.misfit.total - r.misfit.total > least]
+        if base.misfit.little:
+            refits = [r for r in refits if not self.within_a_sample(r)]
+        refits.sort(key=lambda r: r.misfit.total)
+        return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
+
+    def rounded(self, base: SearchState) -> SearchState:
+        """A state with refits of the effects whose size records show by themselves.
+
+        Such as rounding pass for noise, so that they count even where nothing else is left.
+        """
+        at = base.linearisation
+        scores = score(at, [c for c in candidates(base.model) if observed(c)], record_features(at))
+        return replace(base, refits=list(self.refitted(base, scores, full=0)), scores=scores)
+
+    def _show(self, base: SearchState, scores: Sequence[CandidateScore], refits: Sequence[CandidateRefit]) -> None:
+        self.say.watch({"candidates": candidate_table(base, scores, refits, self._added(base.model))})
+
+    def refitted(
+        self, base: SearchState, chosen: Sequence[CandidateScore], full: int = FULL
+    ) -> Iterator[CandidateRefit]:
+        """Candidates refitted on a state, in their order; the first of them from all of their starts."""
+        _ = base.linearisation.columns, base.linearisation.normal  # once, for all that work at the same time
+        jobs = results(lambda job: self._refit_from(base, job[1], job[0] < full), enumerate(chosen))
+        for one in chosen:
+            self.say(f"refitting with {one.effect.name}")
+            yield next(jobs)
+
+    def _refit_from(self, base: SearchState, candidate: CandidateScore, others: bool) -> CandidateRefit:
+        found = self.refit(base, candidate)
+        for start in candidate.others if others else ():
+            if found.misfit.excess > (1.0 - NEAR) * base.misfit.excess:
+                again = self.refit(base, replace(candidate, start=start))
+                found = min(found, again, key=lambda r: r.misfit.total)
+        return found
+
+    def refit(self, base: SearchState, candidate: CandidateScore) -> CandidateRefit:
+        """A candidate refitted on a state, from where its score is best."""
+        at, name = base.linearisation, candidate.effect.name
+        done = refit(at, at.model.with_effect(name), candidate.start)
+        if without_derivative(base.model):
+            done = refit_rounded(at, with_fitted_values(base.model.with_effect(name), done.model))
+        return CandidateRefit(name, done, misfit(self.split, done.costs, self.prior_cost(done.model)))
+
+    def finish(self, base: SearchState, enough: Enough) -> SearchState | None:
+        """The best of the refits, fitted to the end; None where none is worth it.
+
+        ``enough(name, misfit, part)``: whether an effect's misfit is a part of the way to being worth it.
+        """
+        # A quick refit keeps what the model was bent to where the effect acts: the sum alone is asked for.
+        least = base.misfit.total - base.misfit.least
+        worth = [r for r in base.refits if r.misfit.total < least and enough(r.name, r.misfit.summed, PROMISED)]
+        if not worth:
+            return None
+        top = base.misfit.total - worth[0].misfit.total
+        near = [r for r in worth if base.misfit.total - r.misfit.total >= NEAR * top]
+        near = [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][:FULL]
+        found = []
+        for tried in self.set_against_other_subsystems(base, near):
+            self.say(f"fitting with {tried.name}")
+            try:
+                state = self.begun_anew(self.state(tried.refit.model, self._last))
+            except SimulationError:
+                continue
+            if self.better(base, state) and enough(tried.name, state.misfit, 1.0):
+                found.append(state)
+        return min(found, key=lambda s: s.misfit.total, default=None)
+
+    def set_against_other_subsystems(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
+        """The refits to finish: the nearest, or what explains more once all parameters are free.
+
+        A model whose data sheet is bent to its bounds imitates what it lacks, and from there a frozen Jacobian does not
+        lead back. The best of every other subsystem is then fitted to a few segments, too, before one is chosen.
+        """
+        at_bound, library = base.linearisation.parameters.at_bound, base.model.library
+        seen, others = {subsystem(library[r.name]) for r in near}, list[CandidateRefit]()
+        for r in base.refits:
+            if subsystem(library[r.name]) not in seen:
+                seen.add(subsystem(library[r.name]))
+                others.append(r)
+        if not others or not any("." not in key and key in self.priors for key in at_bound):
+            return list(near)
+        found = []
+        for r in [*near, *others[:OTHERS]]:
+            self.say(f"setting {r.name} against effects of other subsystems")
+            try:
+                done = self.fitted_to(self.split.some(ENOUGH), r.refit.model, self._few)
+            except SimulationError:
+                continue
+            fitted = replace(r.refit, model=r.refit.model.with_values(done.values))
+            found.append((done.point.cost, replace(r, refit=fitted)))
+        found.sort(key=lambda pair: pair[0])
+        return [r for _, r in found[:FULL]] or list(near)
+
+
+def varied(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
+    """In their order, and no more than so many of one subsystem."""
+    places = [subsystem(f.effect) for f in found]
+    return [f for i, f in enumerate(found) if places[:i].count(places[i]) < most]

@@ -1,0 +1,168 @@
+"""The data sheet in a search: relaxed where that helps.
+
+In the end only those numbers are others that the records contradict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+
+from hydraulic_sim.errors import SimulationError
+
+from .candidate_fits import FULL, LATER_REFITS, PROMISED, CandidateFits
+from .data_sheet import Deviation, HeldNumbers, least_cost, relaxed, restored, stretched, with_error
+from .fitting import FAR_OFF, worse
+from .misfit import explained, reduction
+from .search_state import SearchResult, SearchState
+from .uncertainty import parameter_errors
+from .worth import FURTHER
+
+WORSE_LOOK = 0.2  # share by which a look at few segments leaves them more: the fit leads to something worse
+SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one
+CLEAR = 10.0  # times what names a number, beyond which a fit need not show what keeping it costs
+
+
+class DataSheetFits(CandidateFits):
+    """Fits with candidates, and with numbers of the data sheet that are others than it says."""
+
+    def loosened(self, strict: SearchState) -> SearchState:
+        """A state with the data sheet relaxed, where that helps, judged by the noise that it shows."""
+        loose = self.loose(strict)
+        return strict if loose is None else self.judged(loose)
+
+    def loose(self, strict: SearchState) -> SearchState | None:
+        """A state with the data sheet relaxed, where that helps."""
+        if not self._strict(strict) or self.nothing_left(strict):
+            return None
+        self.say("fitting the model within the tolerances of its data sheet")
+        # What lies at its bound may be far beyond it, and where much is left so may be what stopped short of it.
+        at_bound = strict.linearisation.parameters.at_bound
+        far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
+        try:
+            # What is far off is bent to imitate what it lacks: the model file's values are nearer to the truth.
+            model = relaxed(self.with_filed_values(strict.model) if far else strict.model)
+            model = self.begun_beyond(model, stretched(self.given)) if far else model
+            loose = self.nearer(model, far)
+        except SimulationError:  # it went where the plant does not run
+            return None
+        helps = self.better(strict, loose) and explained(strict.misfit, loose.misfit) > FURTHER
+        return loose if helps else None
+
+    def concluded(self, found: SearchResult) -> SearchResult:
+        """With the data sheet as it was given, but for the few numbers that the records show to be wrong."""
+        base, final = found.base, found.final
+        if self._strict(base):
+            return found
+        strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
+        done, moved = self.fewest_moved(final, strict if final is base else None)
+        if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
+            simpler = self.simpler(found, strict, done, moved)
+            if simpler is not None:
+                return simpler
+            places = [self.in_place_of(strict, done, [d], moved) for d in moved]
+            every = [(state, i) for i, (_, states) in enumerate(places) for state in states]
+            best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
+            clear = CLEAR * least_cost(done.misfit.count, done.misfit.variance)
+            # All numbers together may do what an effect does, too.
+            if min(done.misfit.total, final.misfit.total) - best.misfit.total > clear:
+                name = new_effect(best, strict)
+                return replace(
+                    found, base=strict, final=best, misfits={name: best.misfit}, competing={name: places[place][0]},
+                    moved=tuple(d for i, d in enumerate(moved) if i != place),
+                )  # fmt: skip
+            moved = [
+                replace(d, instead=tuple(new_effect(s, strict) for s in states))
+                for d, (_, states) in zip(moved, places, strict=True)
+            ]
+        misfits = found.misfits
+        if misfits:
+            misfits = {**misfits, next(reversed(misfits)): done.misfit}
+        return replace(found, base=strict, final=done, misfits=misfits, moved=tuple(moved))
+
+    def simpler(
+        self, found: SearchResult, strict: SearchState, done: SearchState, moved: Sequence[Deviation]
+    ) -> SearchResult | None:
+        """With the one effect that explains what takes several numbers of the data sheet, as BIC has it."""
+        if len(moved) < 2 or not worse(strict.misfit, done.misfit):
+            return None
+        without, states = self.in_place_of(strict, done, moved, moved)
+        best = min(states, key=lambda s: s.misfit.total, default=done)
+        spared = (len(moved) - 1) * np.log(done.misfit.count) * done.misfit.variance
+        if best is done or reduction(best.misfit, done.misfit) > spared or not self.better(strict, best):
+            return None
+        name = new_effect(best, strict)
+        return replace(
+            found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without},
+            numbers_instead=tuple(moved),
+        )  # fmt: skip
+
+    def fewest_moved(self, final: SearchState, strict: SearchState | None) -> tuple[SearchState, list[Deviation]]:
+        """The state in which as few numbers of the data sheet move as explain what all of them do, and these numbers.
+
+        ``final``: all are free; ``strict``: none is, where that is known.
+        """
+        held = HeldNumbers.of(final.linearisation, self.given)
+        enough = least_cost(final.misfit.count, final.misfit.variance)
+        # Far from the file's values the quadratic says little: the data sheet as it is comes first, fitted.
+        for moved in chain([()], filter(None, held.fewest(enough, CLEAR * enough))):
+            done = strict if strict is not None and not moved else self.with_moved(final, moved)
+            if done.misfit.total - final.misfit.total <= enough:
+                break
+        for key in moved:
+            # Another number may say the same, or what a fit gained came from the others, which had stopped short.
+            deviation = self.deviation(held, key, moved, done)
+            if not deviation.sure and deviation.cost < CLEAR * enough:
+                others = tuple(k for k in moved if k != key)
+                back = self.with_moved(done, others)
+                if back.misfit.total - done.misfit.total <= enough:
+                    moved, done = others, back
+        found = []
+        for key in moved:
+            same = []
+            for tied in held.instead(key, moved, enough)[:SUSPECTS]:
+                state = self.with_moved(final, tied)
+                if not worse(state.misfit, done.misfit):
+                    same.append(self.deviation(held, tied[-1], tied, state))
+            found.append(replace(self.deviation(held, key, moved, done), alternatives=tuple(same)))
+        return done, found
+
+    def with_moved(self, state: SearchState, moved: Sequence[str]) -> SearchState:
+        """A state with the data sheet as it was given but for the numbers ``moved``."""
+        self.say("fitting with the data sheet as it is" + (f", but for {' and '.join(moved)}" if moved else ""))
+        return self.state(restored(state.model, self.given, moved), self._last)
+
+    def deviation(self, held: HeldNumbers, key: str, moved: Sequence[str], state: SearchState) -> Deviation:
+        """One of the numbers ``moved`` in a state."""
+        return with_error(held.deviation(key, moved, state.model.value(key)), parameter_errors(state.linearisation))
+
+    def in_place_of(
+        self, strict: SearchState, done: SearchState, taken: Sequence[Deviation], moved: Sequence[Deviation]
+    ) -> tuple[SearchState, list[SearchState]]:
+        """The state with numbers ``taken`` back, and with effects that explain no less than they do.
+
+        ``strict``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
+        """
+        others = [d.key for d in moved if d not in taken]
+        without = self.explore(self.with_moved(done, others) if others else strict, LATER_REFITS)
+        promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
+        found, near = [], [r for r in without.refits if r.misfit.total < promising][:FULL]
+        most = (1.0 + WORSE_LOOK) * self.left_on_few(done) if near else 0.0
+        for r in near:
+            try:
+                if self.looked_at(r.refit.model) > most:
+                    continue
+                reached = self.state(r.refit.model, self._last)
+            except SimulationError:
+                continue
+            if not worse(reached.misfit, done.misfit):
+                found.append(reached)
+        return without, found
+
+
+def new_effect(state: SearchState, before: SearchState) -> str:
+    """The effect that a state has beyond another."""
+    return next(e for e in state.model.effects if e not in before.model.effects)

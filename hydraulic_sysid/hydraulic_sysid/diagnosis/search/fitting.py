@@ -1,0 +1,299 @@
+"""Fits of a model to the segments of a search: from good starts, as far as it pays, judged by the noise they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+from hydraulic_sim.plant import Plant
+from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.estimation.errors import SegmentError
+from hydraulic_sysid.estimation.fit import Fit, FitPoint, FitSettings, fit_segments
+from hydraulic_sysid.estimation.known_starts import KnownStarts
+from hydraulic_sysid.estimation.parameters import Parameters, bounded
+from hydraulic_sysid.estimation.refinement import refined, usable
+from hydraulic_sysid.estimation.segments import Segments, shorter
+
+from .agreement import agreed
+from .candidates import observed
+from .data_sheet import priors, significant
+from .errors import DiagnosisError
+from .frozen_jacobian import refit_rounded
+from .holdout import MOST_VALUES, Split, split
+from .linearisation import Linearisation
+from .misfit import SIGNIFICANT, Misfit, material, misfit
+from .progress import Progress, Watch
+from .search_state import SearchState, loud
+from .worth import EXPLAINED, NOTHING_LEFT
+
+ENOUGH = 60  # segments, spread over all records, that do for a first fit
+FEW_STEPS = 6  # of a fit to those that only sets effects against each other, at most, …
+FEW_GAIN = 2e-3  # … and while a step lowers the sum of squares by this share
+LOOK = 20  # segments, spread over all records, that show where a fit from other values leads, …
+SAME_LOOK = 0.02  # … where it does not leave them less by this share: nowhere else
+SHORTER = 4  # times: segments from which a fit that is far off begins once more
+FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
+BEYOND = 8  # values of a number that lay at its bound, over all where it may go, from which a fit may begin
+QUIETER = 0.95  # of the noise before: what was judged by that is judged again
+RETIMED = 0.03  # sampling intervals by which a channel is less late than before: the same
+FAR_OFF = 4.0  # mean square over noise from which a fit need not be finished
+ROUNDS = 6  # of estimating noise and delays and fitting again, at most
+LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
+LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
+
+Say = Callable[[str], None]
+
+
+F = TypeVar("F", bound="Fitting")
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a search is given: a model and records, cut into segments; ``short`` cuts them a quarter as long."""
+
+    given: Model
+    split: Split
+    short: Callable[[], Split]
+    settings: FitSettings
+    say: Progress
+
+
+class Fitting:
+    """Fits models to one split of records."""
+
+    def __init__(self, task: Task) -> None:
+        self.given, self.split, self.short, self.settings = task.given, task.split, task.short, task.settings
+        self.say = task.say
+        self.path: list[SearchState] = []
+        """The model and what it became with each effect added, as far as the search has come."""
+        self.priors = priors(task.given)
+        self._starts: dict[frozenset[str], KnownStarts] = {}
+        self._first = replace(task.settings, least_gain=FIRST_GAIN)
+        self._few = replace(task.settings, most_steps=FEW_STEPS, least_gain=FEW_GAIN)
+        self._last = replace(task.settings, most_steps=LAST_STEPS, least_gain=LAST_GAIN)
+
+    @classmethod
+    def of(
+        cls: type[F], model: Model, records: Sequence[Record], validation: Sequence[Record], settings: FitSettings,
+        say: Say, within: float | None = None, watch: Watch | None = None, most_values: int = MOST_VALUES,
+    ) -> F:  # fmt: skip
+        """Cut the records; free parameters without bounds get those of a data sheet.
+
+        :param within: seconds after which the search ends with the best so far
+        :param watch: takes what is found meanwhile
+        :param most_values: measured values that are used, spread over all records
+        :raises DiagnosisError: there are no records, or one cannot be cut.
+        """
+        if not records:
+            raise DiagnosisError("there is no record to diagnose")
+        model = bounded(model)
+        length = settings.seconds(model, [*records, *validation])
+        try:
+            cuts = split(records, validation, model, length, most_values)
+            quarter = shorter(length, SHORTER, [*records, *validation])
+            short = partial(split, records, validation, model, quarter, most_values)
+            progress = Progress(say, within, watch or (lambda _: None))
+            return cls(Task(model, cuts, short, replace(settings, length=length), progress))
+        except SegmentError as error:
+            raise DiagnosisError(str(error)) from None
+
+    def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
+        """Fit a model and linearise it."""
+        smooth = self._smooth(model)
+        segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
+        done = self.fitted_to(segments, smooth, settings or self.settings)
+        starts = self._starts.pop(frozenset(smooth.effects), KnownStarts())
+        starts.keep(segments, done.point.initial_states)
+        at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors, starts)
+        left = misfit(self.split, at.costs, at.parameters.prior_cost)
+        if left.variance < FAR_OFF:  # else they are bent to what the model lacks
+            starts.keep(self.split.segments, at.point.initial_states)
+            self._starts[frozenset(smooth.effects)] = starts
+        if smooth is model:
+            return SearchState(at.model, at, left, at.residual)
+        seen = refit_rounded(at, with_fitted_values(model, at.model))
+        return SearchState(seen.model, at, misfit(self.split, seen.costs, self.prior_cost(seen.model)), seen.residual)
+
+    def fitted_to(self, segments: Sequence[Segments], model: Model, settings: FitSettings) -> Fit:
+        """A model, without effects that have no derivative, fitted to these segments."""
+        smooth = self._smooth(model)
+        return fit_segments(
+            Plant.for_fits(smooth), segments, smooth.movable_keys(), settings,
+            progress=lambda *_: self.say.left(), priors=self.priors, starts=self.starts(smooth),
+        )  # fmt: skip
+
+    def starts(self, smooth: Model) -> KnownStarts | None:
+        """Initial states that were fitted with a model's effects, or with the most of them and no others.
+
+        Those of models that are not `FAR_OFF`.
+        """
+        effects = frozenset(smooth.effects)
+        known = [own for own in self._starts if own <= effects]
+        return self._starts[max(known, key=len)] if known else None
+
+    def prior_cost(self, model: Model) -> float:
+        """What a model's values cost by what was known of them beforehand."""
+        return Parameters.of(model, model.movable_keys(), self.priors).prior_cost
+
+    def judged(self, state: SearchState) -> SearchState:
+        """A state, judged by the noise that it shows itself."""
+        for number in range(ROUNDS):
+            self.say("noise of the records")
+            at, before = state.linearisation, self.split
+            segments = refined(at.point, at.columns, self._laws(state.model))
+            after = before.judged(segments, usable(at.point, segments))
+            if number and not quieter(before, after) and not retimed(before, after):
+                break
+            self.split = after
+            state = self.state(state.model, self._last if state.misfit.variance < FAR_OFF else self._first)
+        return state
+
+    def _laws(self, model: Model) -> list[str]:
+        """Parameters that stand for a law: the free ones, not the numbers that a data sheet states."""
+        return [k for k in model.free_keys() if "." in k or self.given.entry(k).free]
+
+    def better(self, before: SearchState, after: SearchState) -> bool:
+        """Whether what a state explains more than another is more than chance; where little is left, by any noise."""
+        if not material(before.misfit, after.misfit):
+            return False
+        return not before.misfit.little or agreed(before.residual, after.residual, self.split.fit)
+
+    def nearer(self, model: Model, far: bool) -> SearchState:
+        """A model fitted: where it is ``far`` off, to the end only if it comes near.
+
+        A resonance has many local minima. What leaves more than a little begins once more from where short segments
+        lead: over few periods a wrong frequency is hardly a wrong phase.
+        """
+        found = self.state(model, self._first if far else self._last)
+        if found.misfit.variance - 1.0 < EXPLAINED:
+            return found
+        best = found
+        with suppress(SimulationError):  # they lead where the plant does not run
+            values = self.fitted_to_short_segments(model)
+            if self.leads_elsewhere(values, found):
+                best = min(found, self.state(values, self._first), key=lambda s: s.misfit.total)
+        done = best.misfit.variance >= FAR_OFF or (best is found and not far)
+        return best if done else self.state(best.model, self._last)
+
+    def begun_beyond(self, model: Model, keys: Sequence[str]) -> Model:
+        """The model, each of these numbers where it leaves short segments least, wherever it may go.
+
+        Between a wrong resonance and the right one there is no way downhill.
+        """
+        if not keys:
+            return model
+        smooth, short = self._smooth(model), self.short().some(ENOUGH)
+        for key in keys:
+            now = smooth.value(key)
+            low, high = smooth.entry(key).bounds or (now, now)
+            costs = {}
+            for value in [now, *np.linspace(low, high, BEYOND).tolist()]:
+                try:
+                    plant = Plant.for_fits(smooth.with_values({key: value}))
+                    costs[value] = FitPoint.begin(plant, short, smooth.movable_keys(), priors=self.priors).cost
+                except SimulationError:
+                    continue
+            smooth = smooth.with_values({key: min(costs, key=lambda v: costs[v], default=now)})
+        return model.with_values({key: smooth.value(key) for key in keys})
+
+    def begun_anew(self, state: SearchState) -> SearchState:
+        """A state, or where that leaves less, one with the same effects fitted from the values of the model file.
+
+        A model that lacks an effect is bent to imitate it, often up to bounds, and once the effect is there a fit from
+        such values may end in a local minimum.
+        """
+        if state.misfit.variance - 1.0 < NOTHING_LEFT:
+            return state
+        filed = self.with_filed_values(state.model)
+        try:
+            if not self.leads_elsewhere(filed, state):
+                return state
+            again = self.state(filed, self._last)
+        except SimulationError:
+            return state
+        return min(state, again, key=lambda s: s.misfit.total)
+
+    def fitted_to_short_segments(self, model: Model) -> Model:
+        """The model with what a first fit to segments a quarter as long gives."""
+        done = self.fitted_to(self.short().some(SHORTER * ENOUGH), model, self._first)
+        return model.with_values(done.values)
+
+    def leads_elsewhere(self, model: Model, state: SearchState) -> bool:
+        """Whether a fit that begins with this model's values leaves a few segments clearly less than a state does."""
+        return self.looked_at(model) < (1.0 - SAME_LOOK) * self.left_on_few(state)
+
+    def looked_at(self, model: Model) -> float:
+        """What a fit to a few segments leaves of them."""
+        return self.fitted_to(self.split.some(LOOK), model, self._last).cost
+
+    def left_on_few(self, state: SearchState) -> float:
+        """What a state leaves of the same segments."""
+        model = self._smooth(state.model)
+        few = self.split.some(LOOK)
+        keys = model.movable_keys()
+        starts = self.starts(model)
+        return FitPoint.begin(Plant.for_fits(model), few, keys, priors=self.priors, starts=starts).at_rest().cost
+
+    def with_filed_values(self, model: Model) -> Model:
+        """A model with the values of the model file, where that has them."""
+        return model.with_values({k: self.given.value(k) for k in self.given.movable_keys()})
+
+    def _strict(self, base: SearchState) -> bool:
+        """Whether the data sheet is as it was given."""
+        at, given = base.model.entry, self.given.entry
+        return all(
+            (at(k).free, at(k).bounds) == (given(k).free, given(k).bounds) for k in self.given.keys() if "." not in k  # noqa: SIM118
+        )  # fmt: skip
+
+    def _smooth(self, model: Model) -> Model:
+        """Without effects that have no derivative."""
+        for name in without_derivative(model):
+            model = model.without_effect(name)
+        return model
+
+    def _added(self, model: Model) -> list[str]:
+        return [e for e in model.effects if e not in self.given.effects]
+
+
+def quieter(before: Split, after: Split) -> bool:
+    """Whether the noise of any channel has turned out to be clearly smaller, in all of a record or in parts of it."""
+    return any(
+        n < QUIETER * o
+        for new, old in zip(after.segments, before.segments, strict=True)
+        for n, o in zip(loud(new), loud(old), strict=True)
+    )
+
+
+def retimed(before: Split, after: Split) -> bool:
+    """Whether the small delay of any channel has turned out to be another: an effect may only have undone it.
+
+    It must change more of what is recorded than the noise hides.
+    """
+    changed = dict.fromkeys(after.channels, 0.0)
+    for new, old in zip(after.segments, before.segments, strict=True):
+        for c, (n, o) in enumerate(zip(new.readings, old.readings, strict=True)):
+            if abs(n.delay - o.delay) > RETIMED * new.record.dt:
+                changed[new.channels[c]] += (n.delay - o.delay) ** 2 * float(new.timing[c])
+    return any(c > SIGNIFICANT for c in changed.values())
+
+
+def without_derivative(model: Model) -> list[str]:
+    """Effects of a model whose size the records show by themselves."""
+    return [name for name in model.effects if observed(model.library[name])]
+
+
+def with_fitted_values(model: Model, fitted: Model) -> Model:
+    """The model with what was fitted in one that lacks some of its effects."""
+    return model.with_values({k: fitted.value(k) for k in fitted.movable_keys()}, source="fitted")
+
+
+def worse(misfit: Misfit, best: Misfit) -> bool:
+    """Whether a model is significantly worse than another."""
+    return significant(misfit.total - best.total, misfit.count, misfit.variance)

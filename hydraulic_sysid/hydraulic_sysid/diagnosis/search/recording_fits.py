@@ -1,0 +1,170 @@
+"""Faults of the recording in a search: found, sized again while they change, and set against effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+
+from .candidate_fits import FULL, NEAR
+from .data_sheet import relaxed, restored
+from .data_sheet_fits import DataSheetFits
+from .drive_faults import costs_with
+from .fitting import Task, worse
+from .holdout import Split
+from .misfit import explained, material, misfit
+from .recording_faults import RecordingFault, recording_faults, resized
+from .remainder import immaterial, negligible, remainders
+from .search_state import FaultFit, SearchResult, SearchState
+from .worth import FURTHER, NOTHING_LEFT, PROMISES, leaves_most
+
+MOST_FAULTS = 3  # of the recording
+UNNOTICED = 0.003  # of the motion in a segment: what leaves less is no disturbance of the drive
+MOST_SIZES = 4  # times that the size of a fault is sought again, …
+SAME_SIZE = 0.005  # … until it changes by no more than this share: what is left of a gain is an offset
+RIVAL = 0.8  # of what the best candidate explains, from which a fault of the recording may be in its place
+GLIMPSED = 0.25  # of what an effect must explain, which a fault of a reading must before the model is fitted with it
+
+
+class RecordingFits(DataSheetFits):
+    """Fits with candidates and other numbers, and to records that are taken to have a fault."""
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self.faults: list[RecordingFault] = []
+        self.rivals: list[RecordingFault] = []
+        """Other faults, that explain about as much as the best candidate."""
+        self.as_recorded: SearchState | None = None
+        """Before any fault was assumed."""
+
+    def recorded(self, base: SearchState) -> SearchState:
+        """A state with its candidates explored, and with every fault of the recording that explains more than they."""
+        for tried in range(MOST_FAULTS + 1):
+            self.path = [base]
+            nothing = self.nothing_left(base)
+            if not nothing:
+                base = self.explore(base)
+            if tried == MOST_FAULTS:
+                break
+            left = remainders(self.split, base.residual)
+            self.say("faults of the recording")
+            # A disturbance is free enough to take up what laws leave, the reading of a channel is not.
+            disturbances = not (nothing or negligible(left, UNNOTICED) or immaterial(base.misfit, left))
+            faults = recording_faults(base.linearisation, disturbances)
+            if nothing and not any(self.bends(f, base) for f in faults):
+                break
+            best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
+            enough = RIVAL * (base.misfit.fit - best)
+            named = [f for f in faults if not base.misfit.little or f.unusual(self.split.interval)]
+            self.rivals = [f for f in named if not f.linear and f.reduction >= enough][:FULL]
+            # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
+            least = base.misfit.fit - best - base.misfit.least
+            readings = [f for f in faults if not f.linear]
+            near = [f for f in readings if f.reduction >= max(NEAR * readings[0].reduction, GLIMPSED * least)][:FULL]
+            if faults and faults[0].linear and faults[0].reduction >= least:
+                near = faults[:1]
+            if not near:
+                break
+            found = self.plainest(base, [self.with_fault(base, f) for f in near])
+            if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
+                break
+            if leaves_most(base.misfit, found.misfit) or base.misfit.fit - found.misfit.fit < least:
+                break
+            # Filters of sound transducers delay by a part of a sampling interval, too: that is known, but not named.
+            if not base.misfit.little or found.fault.unusual(self.split.interval):
+                self.as_recorded = self.as_recorded or base
+                self.faults = together(self.faults, found.fault)
+            self.split, self.path = found.split, [found.state]
+            base = self.loosened(self.judged(found.state))
+        return base if base.scores else self.rounded(base)
+
+    def bends(self, fault: RecordingFault, base: SearchState) -> bool:
+        """Whether a fault is why a model leaves nothing only with small delays of all channels, or at bounds."""
+        return fault.unusual(self.split.interval) and fault.reduction > PROMISES * base.misfit.least
+
+    def with_fault(self, base: SearchState, fault: RecordingFault) -> FaultFit:
+        """A state fitted to records that are taken to have a fault, again while the fault's best size changes."""
+        self.say(f"fitting with: {fault.text}")
+        before, tried = self.split, list[tuple[RecordingFault, SearchState, Split]]()
+        try:
+            for sized in fault.starts(before.interval):
+                self.split = replace(before, segments=sized.applied(base.linearisation))
+                tried.append((sized, self.begun_anew(self.state(base.model, self._last)), self.split))
+                if tried[-1][1].misfit.variance - 1.0 < NOTHING_LEFT:
+                    break
+            fault, state, self.split = min(tried, key=lambda one: one[1].misfit.total)
+            for _ in range(MOST_SIZES):
+                new, error = resized(state.linearisation, fault), SAME_SIZE * abs(fault.size)
+                if new is fault or abs(new.size - fault.size) < max(error, 2.0 * new.standard_error):
+                    break
+                fault = replace(new, reduction=fault.reduction)
+                self.split = replace(before, segments=fault.on(before.segments))
+                state = self.state(state.model, self._last)
+            worth = misfit(self.split, costs_with(state.linearisation, base.linearisation), state.misfit.prior)
+            return FaultFit(fault, state, self.split, worth)
+        finally:
+            self.split = before
+
+    def plainest(self, base: SearchState, fits: Sequence[FaultFit]) -> FaultFit:
+        """Of fits with different faults the best; of those that explain much alike, with the data sheet as it is.
+
+        One transducer that reads too little is the other one that reads too much, with other areas and another supply.
+        """
+        best = min(fits, key=lambda f: f.misfit.total)
+        worth = NEAR * (base.misfit.total - best.misfit.total)
+        alike = [f for f in fits if base.misfit.total - f.misfit.total >= worth]
+        if len(alike) < 2 or self._strict(base):
+            return best
+        before, left = self.split, list[float]()
+        try:
+            for fit in alike:
+                self.split = fit.split
+                left.append(self.with_moved(fit.state, ()).misfit.total)
+        except SimulationError:  # the data sheet as it is does not run with what was fitted
+            return best
+        finally:
+            self.split = before
+        return alike[left.index(min(left))]
+
+    def set_against_faults(self, found: SearchResult) -> SearchResult:
+        """With the faults of the recording that explain what the one effect added does.
+
+        One that explains by itself what takes the effect and other numbers of the data sheet is the simpler answer.
+        """
+        if len(found.added) != 1:
+            return found
+        model = found.final.model.without_effect(found.added[0])
+        same = list[RecordingFault]()
+        for fault in self.rivals:
+            alone = self.as_good(found, restored(model, self.given, []), fault)
+            if alone is not None and found.moved:
+                return replace(
+                    found, split=alone.split, base=alone.state, final=alone.state, misfits={}, competing={}, moved=(),
+                    faults=tuple(together(found.faults, alone.fault)),
+                    as_recorded=found.as_recorded or found.base,
+                )  # fmt: skip
+            # Beside a fault, other numbers may be wrong than beside the effect.
+            tied = (
+                self.as_good(found, model, fault) or self.as_good(found, relaxed(model), fault)
+                if found.moved
+                else alone
+            )
+            same += [tied.fault] if tied is not None else []
+        return replace(found, faults_instead=tuple(same))
+
+    def as_good(self, found: SearchResult, model: Model, fault: RecordingFault) -> FaultFit | None:
+        """A model with a fault of the recording, if together they explain what was found."""
+        try:
+            tried = self.with_fault(replace(found.final, model=model), fault)
+        except SimulationError:  # with the values that it has beside the effect
+            return None
+        return None if worse(tried.state.misfit, found.final.misfit) else tried
+
+
+def together(faults: Sequence[RecordingFault], found: RecordingFault) -> list[RecordingFault]:
+    """Faults with one more, which is more of the same where the same fault of a channel's reading was found before."""
+    same = [f for f in faults if f.hypothesis is found.hypothesis and not f.linear]
+    more = [replace(found, size=f.size + found.size, reduction=f.reduction + found.reduction) for f in same]
+    return [*(f for f in faults if f not in same), *(more or [found])]
