@@ -28,7 +28,7 @@ from hydraulic_sysid.diagnosis.search.score_test import CandidateScore
 from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
 from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
-from hydraulic_sysid.diagnosis.search.worth import absorbs_discrepancy, decisive, without_competitor
+from hydraulic_sysid.diagnosis.search.worth import absorbs_discrepancy, decisive, nothing_gained, without_competitor
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise import code_step
 from hydraulic_sysid.estimation.parameters import bounded, scale
@@ -239,6 +239,15 @@ def test_where_nothing_need_be_missing_an_effect_must_explain_what_is_left(model
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     assert bool(decisive(found).added) is named
     assert decisive(found).final is (final if named else base)
+
+
+def test_what_lowers_the_residual_by_less_than_anybody_sees_is_no_effect() -> None:
+    """However surely: with many values the least reduction that counts is far smaller."""
+    before = Misfit(80_000.0, 40_000.0, 80_000, 40_000)
+    for share, gained in ((0.99, False), (0.97, True)):
+        after = Misfit(share * 80_000.0, share * 40_000.0, 80_000, 40_000)
+        assert before.total - after.total > 10.0 * before.least
+        assert nothing_gained(before, after) is not gained
 
 
 @pytest.mark.parametrize(("after", "named"), [(60.0, False), (10.0, True)])

@@ -19,6 +19,7 @@ ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished
 NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing more is looked for, …
 PROMISES = 3.0  # … unless a candidate promises to take off so many times the least reduction that counts
+SEEN = 0.01  # of the residual, by which it must fall where nothing seemed to be left; effects gave 1.5 % and more
 EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
 MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
 ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
@@ -104,13 +105,18 @@ def leaves_most(before: Misfit, after: Misfit, nothing: bool = False) -> bool:
 
     So little is left that it may be the noise, or, whatever the sensors show, it is ``nothing`` to anybody.
     """
-    left = max(SMALL_UNEXPLAINED * (before.usual - 1.0 if nothing else before.variance - 1.0), NOTHING_LEFT)
+    left = max(SMALL_UNEXPLAINED * (before.usual - 1.0), NOTHING_LEFT)
     return (before.little or nothing) and after.usual - 1.0 > left
 
 
 def nothing_gained(before: Misfit, after: Misfit) -> bool:
-    """Whether nothing was left before, and effects take nothing off what noise leaves."""
-    return before.variance - 1.0 < NOTHING_LEFT and before.total - after.total < PROMISES * before.least
+    """Whether nothing was left before, and effects take nothing off what noise leaves that anybody would see.
+
+    Segments may agree on it: rounding looks like a resonance to a small light piston.
+    """
+    gain = before.total - after.total
+    seen = after.squares < (1.0 - SEEN) ** 2 * before.squares
+    return before.usual - 1.0 < NOTHING_LEFT and (gain < PROMISES * before.least or not seen)
 
 
 def decisive(found: SearchResult) -> SearchResult:
