@@ -48,7 +48,7 @@ def main(argv: list[str] | None = None) -> int:
     where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
     parser.add_argument("--out", type=Path, default=OUT, help="folder of the outcomes")
     parser.add_argument("--no-reference", action="store_true", help="skip the refits of the true structures (faster)")
-    parser.add_argument("--quick", action="store_true", help="as `diagnose --quick` answers; into a folder of its own")
+    parser.add_argument("--quick", action="store_true", help="as `diagnose --quick` answers")
     parser.add_argument("--report-only", action="store_true", help="examine nothing, report what is in the folder")
     parser.add_argument("--doc", action="store_true", help=f"write {PAGE.relative_to(ROOT)}")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the benches instead of diagnosing them")
@@ -64,13 +64,13 @@ def main(argv: list[str] | None = None) -> int:
         for bench in chosen:
             print(benches.write(bench, options.write))
         return 0
+    most_values = QUICK_VALUES if options.quick else MOST_VALUES
     if options.report_only:
         names = {b.name for b in chosen}
-        found = [d for d in matrix.kept(options.out) if d["answer"]["name"] in names]
+        found = [d for d in matrix.kept(options.out, most_values) if d["answer"]["name"] in names]
     else:
         crew = campaign.dask_cluster(options.scheduler) if options.scheduler else campaign.processes(options.processes)
         reference = not (options.no_reference or options.family or options.quick)
-        most_values = QUICK_VALUES if options.quick else MOST_VALUES
         found = matrix.run(chosen, options.out, crew, reference, most_values)
     if not found:
         print("nothing was examined yet")

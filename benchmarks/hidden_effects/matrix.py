@@ -51,7 +51,7 @@ def examine(bench: benches.Bench, reference: bool = True, most_values: int = MOS
         new = Path(scratch) / "new"
         fresh = read_all(benches.write_records(again, new, bench.setting.decimals)) if again else []
     answer = bench.answer()
-    found: dict[str, Any] = {"version": version(), "answer": answer}
+    found: dict[str, Any] = {"version": version(), "answer": answer, "most_values": most_values}
     begin, busy = time.perf_counter(), time.process_time()
     try:
         diagnosis = diagnose(model, records, most_values=most_values)
@@ -170,12 +170,12 @@ def _told(progress: campaign.Progress) -> None:
         print(f"{found['cpu_seconds']:6.1f} s  {right}  {name:70s} {said}", flush=True)
 
 
-def kept(folder: Path) -> list[dict[str, Any]]:
-    """All that was found in the present state of the code, judged anew."""
+def kept(folder: Path, most_values: int = MOST_VALUES) -> list[dict[str, Any]]:
+    """All that was found in the present state of the code with so many values, judged anew."""
     outcomes = (json.loads(path.read_text()) for path in sorted((folder / CASES).glob("*.json")))
     found = [o["row"] for o in outcomes if o["state"] == "done"]
     now = version()
-    return [_judged(d, d["answer"]) for d in found if d["version"] == now]
+    return [_judged(d, d["answer"]) for d in found if (d["version"], d.get("most_values")) == (now, most_values)]
 
 
 def _judged(document: dict[str, Any], answer: dict[str, Any]) -> dict[str, Any]:

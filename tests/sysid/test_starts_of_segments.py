@@ -123,15 +123,18 @@ def test_a_segment_that_begins_far_off_alone_finds_its_way(model: Model, segment
 
 def test_a_fit_begins_where_the_last_one_ended(model: Model, segments: list[Segments]) -> None:
     """Where that leaves less than what the record shows of the beginning; so, too, of some of the segments."""
-    plant = Plant.for_fits(model)
-    begin, starts = FitPoint.begin(plant, segments, ()), KnownStarts()
-    fitted = begin.at_rest()
+    plant, starts, (s,) = Plant.for_fits(model), KnownStarts(), segments
+    fitted = FitPoint.begin(plant, segments, ()).at_rest()
     starts.keep(segments, fitted.initial_states)
+    smoothed = s.smoothed.copy()
+    smoothed[s.first[7]] += [2e-3, 0.0, 1e6, -1e6]
+    misread = [replace(s, smoothed=smoothed)]
+    assert worst(FitPoint.begin(plant, misread, ())) > 2.0 * worst(fitted)
+    assert worst(FitPoint.begin(plant, misread, (), starts=starts)) < 1.05 * worst(fitted)
+    every_other = [misread[0].subset(np.arange(len(s)) % 2 == 1)]
+    assert worst(FitPoint.begin(plant, every_other, (), starts=starts)) < 1.05 * worst(fitted)
+    begin, wrong = FitPoint.begin(plant, segments, ()), KnownStarts()
     assert FitPoint.begin(plant, segments, (), starts=starts).cost <= fitted.cost * (1.0 + 1e-9)
-    every_other = [segments[0].subset(np.arange(len(segments[0])) % 2 == 0)]
-    some = FitPoint.begin(plant, every_other, (), starts=starts)
-    assert some.cost <= sum(fitted.costs[0][::2]) * (1.0 + 1e-9)
-    wrong = KnownStarts()
     wrong.keep(segments, [fitted.initial_states[0] + 1.0])
     assert FitPoint.begin(plant, segments, (), starts=wrong).cost == begin.cost
 

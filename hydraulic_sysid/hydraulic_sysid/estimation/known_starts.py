@@ -1,6 +1,6 @@
 """Initial states that segments were fitted with before: the next fit begins from there.
 
-What a piston did at the begin of a segment does not depend on the model, and a fitted model knows it better than a
+What a piston did at the beginning of a segment does not depend on the model, and a fitted model knows it better than a
 noisy sensor. A fit that begins from what the record shows may end in another minimum, worse than that it came from.
 """
 

@@ -19,13 +19,6 @@ def project_out(basis: Array, values: Array) -> Array:
     return values - basis @ (np.swapaxes(basis, -1, -2) @ values)
 
 
-def squares(left: Array) -> Array:
-    """(S,) sum of squares of each segment of (S, m, 1), infinite where a run has left all bounds."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        found = np.sum(left**2, axis=(1, 2))
-    return np.where(np.isfinite(found), found, np.inf)
-
-
 @dataclass(frozen=True)
 class Explained:
     """What linear unknowns explain of each segment: the share ``taken`` (S, F) of orthonormal ``basis`` (S, m, F).
@@ -54,6 +47,12 @@ class Explained:
     def beyond(self, columns: Array) -> Array:
         """What of (S, m, P) they cannot explain."""
         return columns - self.basis @ (self.taken[..., None] * (np.swapaxes(self.basis, -1, -2) @ columns))
+
+    def left(self, residual: Array) -> Array:
+        """(S,) sum of squares of what of (S, m) they cannot explain; infinite where a run leaves all bounds."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = np.sum(self.beyond(residual[..., None]) ** 2, axis=(1, 2))
+        return np.where(np.isfinite(found), found, np.inf)
 
     def subset(self, chosen: Mask) -> Explained:
         """Of the ``chosen`` (S,) segments alone."""
@@ -119,8 +118,7 @@ class Projection:
 
         Infinite where a run leaves all bounds.
         """
-        with np.errstate(over="ignore", invalid="ignore"):
-            return squares(self.by_nuisance.beyond(self.raw[..., None]))
+        return self.by_nuisance.left(self.raw)
 
     def beyond(self, columns: Array) -> Array:
         """What of (S, m, P) the initial states and the nuisance cannot explain."""

@@ -15,7 +15,7 @@ from hydraulic_sim.plant import Plant
 
 from .parallel import results
 from .parameters import Parameters
-from .projection import Projection, squares
+from .projection import Projection
 from .segments import Segments
 
 T = TypeVar("T")
@@ -86,7 +86,7 @@ class Shooting:
         return [np.where((b < a)[:, None], changed, states) for states, changed, a, b in pairs]
 
     def _left(self, raw: Sequence[Array]) -> list[Array]:
-        return [squares(s.all_nuisance[1].beyond(r[..., None])) for s, r in zip(self.segments, raw, strict=True)]
+        return [s.all_nuisance[1].left(r) for s, r in zip(self.segments, raw, strict=True)]
 
     def try_out(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
         """The `residuals` of another plant.

@@ -49,8 +49,6 @@ LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
 LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
 
 Say = Callable[[str], None]
-
-
 F = TypeVar("F", bound="Fitting")
 
 

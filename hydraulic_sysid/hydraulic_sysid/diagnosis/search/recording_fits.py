@@ -16,7 +16,7 @@ from .fitting import Task, worse
 from .holdout import Split
 from .misfit import explained, material, misfit
 from .recording_faults import RecordingFault, recording_faults, resized
-from .remainder import immaterial, negligible, remainders
+from .remainder import negligible
 from .search_state import FaultFit, SearchResult, SearchState
 from .worth import FURTHER, NOTHING_LEFT, PROMISES, leaves_most
 
@@ -48,10 +48,9 @@ class RecordingFits(DataSheetFits):
                 base = self.explore(base)
             if tried == MOST_FAULTS:
                 break
-            left = remainders(self.split, base.residual)
             self.say("faults of the recording")
             # A disturbance is free enough to take up what laws leave, the reading of a channel is not.
-            disturbances = not (nothing or negligible(left, UNNOTICED) or immaterial(base.misfit, left))
+            disturbances = not (nothing or negligible(base.remainders, UNNOTICED) or base.immaterial)
             faults = recording_faults(base.linearisation, disturbances)
             if nothing and not any(self.bends(f, base) for f in faults):
                 break

@@ -49,9 +49,14 @@ class SearchState:
     scores: list[CandidateScore] = field(default_factory=list)
 
     @cached_property
+    def remainders(self) -> list[Remainder]:
+        """What is left, in the units of the sensors."""
+        return remainders(self.linearisation.split, self.residual)
+
+    @cached_property
     def immaterial(self) -> bool:
-        """Whether what is left is nothing to anybody."""
-        return immaterial(self.misfit, remainders(self.linearisation.split, self.residual))
+        """Whether that is nothing to anybody."""
+        return immaterial(self.misfit, self.remainders)
 
     def others(self, name: str) -> list[CandidateRefit]:
         """The refits with another effect than this one."""
