@@ -14,10 +14,13 @@ from .segments import Segments
 
 
 class KnownStarts:
-    """By record and first sample: those states of a segment that are estimated."""
+    """By record and first sample: those states of a segment that are estimated.
 
-    def __init__(self) -> None:
-        self._known: dict[tuple[str, float, int], Array] = {}
+    :param like: others, from which these begin
+    """
+
+    def __init__(self, like: KnownStarts | None = None) -> None:
+        self._known: dict[tuple[str, float, int], Array] = {} if like is None else dict(like._known)
 
     def keep(self, segments: Sequence[Segments], initial_states: Sequence[Array]) -> None:
         """States (S_i, n_states) that segments of every record were fitted with."""

@@ -107,7 +107,8 @@ class Fitting:
         smooth = self._smooth(model)
         segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
         done = self.fitted_to(segments, smooth, settings or self.settings)
-        starts = self._starts.pop(frozenset(smooth.effects), KnownStarts())
+        starts = KnownStarts(self.starts(smooth))
+        self._starts.pop(frozenset(smooth.effects), None)
         starts.keep(segments, done.point.initial_states)
         at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors, starts)
         left = misfit(self.split, at.costs, at.parameters.prior_cost)
