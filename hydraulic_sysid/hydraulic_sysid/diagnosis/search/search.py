@@ -8,7 +8,7 @@ it builds on stands in layers: `fitting`, `candidate_fits`, `data_sheet_fits`, `
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -163,7 +163,7 @@ class Search(RecordingFits):
         if len(added) > 1 or known is not None:
             final, kept, competing = self._reviewed(base, final, added, competing)
             if kept != added or len(misfits) < len(kept):
-                misfits = self._misfits(base, final, kept)
+                misfits = self._misfits(base, final, kept, competing)
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
 
@@ -233,17 +233,21 @@ class Search(RecordingFits):
                 state, swaps, competing, queue = other, swaps + 1, {new: near}, others
         return state, added, competing
 
-    def _misfits(self, base: SearchState, final: SearchState, added: Sequence[str]) -> dict[str, Misfit]:
+    def _misfits(
+        self, base: SearchState, final: SearchState, added: Sequence[str], competing: Mapping[str, SearchState]
+    ) -> dict[str, Misfit]:
         """The misfit after each effect, in the order of how much it explains by itself: the largest first."""
         alone = {r.name: r.misfit.total for r in base.refits}
+        known = {frozenset(s.model.effects): s.misfit for s in competing.values()}
         order = sorted(added, key=lambda name: alone.get(name, float("inf")))
         found: dict[str, Misfit] = {}
         model = base.model
         for name in order[:-1]:
             own = [p.name for p in model.library[name].parameters]
             model = model.with_effect(name, {p: final.model.value(f"{name}.{p}") for p in own})
+            have = frozenset(model.effects)
             try:
-                found[name] = self.state(model, self._last).misfit
+                found[name] = known[have] if have in known else self.state(model, self._last).misfit
             except SimulationError:  # with the values that it has beside the others
                 found[name] = next(reversed(found.values()), base.misfit)
         return {**found, **{name: final.misfit for name in order[-1:]}}
