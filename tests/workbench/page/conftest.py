@@ -95,15 +95,19 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def start_bench(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Bench]]:
-    """Starts a workbench in a ROS domain of its own: `start_bench("--hide", "valve_deadband")`."""
+    """Starts a workbench in a ROS domain of its own: `start_bench("--hide", "valve_deadband")`.
+
+    ``program``: a script that runs it in another way.
+    """
     folder = tmp_path_factory.mktemp("workbench")
     started: list[Process] = []
     environment = pytest.MonkeyPatch()
     environment.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
     environment.setenv("PYTHONUNBUFFERED", "1")
 
-    def start(*arguments: str) -> Bench:
-        command = [sys.executable, "-m", "hydraulic_workbench.nodes.workbench", "--no-browser"]
+    def start(*arguments: str, program: Path | None = None) -> Bench:
+        started_by = [str(program)] if program else ["-m", "hydraulic_workbench.nodes.workbench"]
+        command = [sys.executable, *started_by, "--no-browser"]
         command += ["--folder", str(folder / f"bench_{len(started)}"), *arguments]
         started.append(Process(command, folder / f"bench_{len(started)}.log"))
         return Bench(started[-1], chromium)
