@@ -44,6 +44,7 @@ def run(bench: Bench, arguments: list[str]) -> int:
     if arguments:
         here = Path.cwd() if root in Path.cwd().parents else root  # so that given paths mean what they say
         return Pytest([*python, "pytest", *arguments], here, variables, longest=threading.TIMEOUT_MAX).code
+    variables.pop("PYTHONDONTWRITEBYTECODE", None)  # each of hundreds of processes would compile all that it imports
     failed = []
     # Once, and beside the checks: else each of the workers would begin with it. The tests say what is wrong with it.
     with subprocess.Popen([python[0], "-c", COMPILE], cwd=root, env=variables):
