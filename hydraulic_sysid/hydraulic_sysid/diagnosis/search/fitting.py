@@ -148,7 +148,9 @@ class Fitting:
             at, before = state.linearisation, self.split
             segments = refined(at.point, at.columns, self._laws(state.model))
             after = before.judged(segments, usable(at.point, segments))
-            if number and not quieter(before, after) and not retimed(before, after):
+            # What is far off says little of the noise, however often it is asked.
+            far = state.misfit.variance >= FAR_OFF
+            if number and (far or not (quieter(before, after) or retimed(before, after))):
                 break
             self.split = after
             state = self.state(state.model, self._last if state.misfit.variance < FAR_OFF else self._first)

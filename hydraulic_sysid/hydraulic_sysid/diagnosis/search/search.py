@@ -132,7 +132,8 @@ class Search(RecordingFits):
             )
             if better is not None and not added:
                 # The fit with an effect may have gone on where that without it had stopped.
-                plain = self.state(better.model.without_effect(new_effect(better, base)), self._last)
+                without = better.model.without_effect(new_effect(better, base))
+                plain = self.state(without, self._last) if self.leads_elsewhere(without, base) else base
                 if not material(plain.misfit, better.misfit):
                     base = replace(plain, refits=base.refits, scores=base.scores)
                     path, better = [base], None
