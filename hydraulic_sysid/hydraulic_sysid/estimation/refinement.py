@@ -50,8 +50,8 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
         dt = segments[where[0][0]].record.dt
         cleaned = [np.where(spikes[i][:, :, c], 0.0, left[i][:, :, c])[near[i]] for i, c in where]
         known = {f for i, c in where for f in segments[i].hum[c]}
-        lines[channel] = tuple(known) or _lines([r[:, :-1].ravel() for r in cleaned if len(r)], dt)
         parts = [segments[i].subset(near[i]) for i, _ in where]
+        lines[channel] = tuple(known) or _lines([_in_place(r, p) for r, p in zip(cleaned, parts, strict=True) if len(p)], dt)
         quiet = [_without(r, lines[channel], part) for r, part in zip(cleaned, parts, strict=True)]
         # Its colour is that of all, each segment brought to the same strength.
         even = noise_model.estimate(quiet, dt)
@@ -84,11 +84,11 @@ def usable(point: FitPoint, found: Sequence[Segments]) -> list[Mask]:
 def but_accidents(near: Sequence[Mask]) -> list[Mask]:
     """All segments (S,) but the few that are not ``near``, as after a knock on the bench.
 
-    Where many are not, something acts there that the model does not have.
+    Where many are not, something acts there that the model does not have; so it does where all of a record are not.
     """
     every = np.concatenate(near)
     accident = np.count_nonzero(~every) <= max(1.0, ACCIDENTS * every.size)
-    return [n if accident else np.ones_like(n) for n in near]
+    return [n if accident and n.any() else np.ones_like(n) for n in near]
 
 
 def _near(point: FitPoint, spikes: Sequence[Mask]) -> list[Mask]:
@@ -162,6 +162,14 @@ def _without(residual: Array, lines: Sequence[float], segments: Segments) -> Arr
         return residual
     basis, _ = np.linalg.qr(_waves(segments, lines))
     return residual - (basis @ (np.swapaxes(basis, -1, -2) @ residual[..., None]))[..., 0]
+
+
+def _in_place(residual: Array, segments: Segments) -> Array:
+    """Residuals (S, samples) on the record's time, 0 where no segment is: a line keeps its phase over what is out."""
+    index = segments.first[:, None] + np.arange(segments.samples)
+    found = np.zeros(int(np.ptp(index)) + 1)
+    found[index - index.min()] = residual - residual.mean()
+    return found
 
 
 def _lines(residuals: Sequence[Array], dt: float) -> tuple[float, ...]:

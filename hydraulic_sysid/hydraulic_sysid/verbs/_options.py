@@ -28,6 +28,7 @@ from hydraulic_sim.trust import add_trust_option
 from hydraulic_sysid.data import results
 from hydraulic_sysid.data.records import Record, read_all
 from hydraulic_sysid.data.records.formats import SUFFIXES
+from hydraulic_sysid.data.records.paired import paired
 
 MODEL = "model.yaml"
 Say = Callable[[str], None]
@@ -155,15 +156,15 @@ def add_record_options(parser: argparse.ArgumentParser, *, required: bool = True
 
 
 def read_records(options: argparse.Namespace) -> list[Record]:
-    """The records that the command line names, or their part; none where it names none."""
-    records = read_all(options.record, options.columns) if options.record else []
+    """The records that the command line names, `paired`, or their part; none where it names none."""
+    records = paired(read_all(options.record, options.columns)) if options.record else []
     window = getattr(options, "window", None)
     return [r.window(*window) for r in records] if window else records
 
 
 def read_kept_back(paths: list[Path] | None, options: argparse.Namespace) -> list[Record]:
     """Records that an option of their own names; none where it does not."""
-    return read_all(paths, options.columns) if paths else []
+    return paired(read_all(paths, options.columns)) if paths else []
 
 
 def add_part_options(parser: argparse.ArgumentParser, part: float) -> None:

@@ -1,8 +1,8 @@
 """Records cut into segments, and which of them are for fitting, which for validation.
 
 Where no validation records are named, every third block of a few segments of every record is for validation, so that
-both have seen the same experiments; segments for validation never enter a fit, but they steer what is added. Of very
-long records blocks are left out, evenly, so that memory and time are bounded.
+both have seen the same experiments; segments for validation never enter a fit, but they steer what is added. Of records
+that have more values than do, blocks are left out, evenly, so that memory and time are bounded.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from .set_aside import SetAside, set_aside
 
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
-MOST_VALUES = 80_000  # measured values of all segments: 27 s of three channels at 1 kHz; three times as many say the same …
-QUICK_VALUES = 20_000  # … and for an answer in seconds: seven
+MOST_VALUES = 80_000  # measured values of all segments, spread: 27 s of three channels at 1 kHz; more hardly say more …
+QUICK_VALUES = 40_000  # … and for an answer in seconds: thirteen; half as many miss every sixth effect
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
 

@@ -1,4 +1,4 @@
-"""What of a record is not judged: converters at their end, rests against a stop the model lacks, accidents.
+"""What of a record is not judged: converters at their end, rests against a stop, runs apart, accidents.
 
 A channel at its end does not show what it measures. A piston that stands against a stop while the valve is open says
 where the stop is and nothing of the physics between the stops; where the model has its stop elsewhere (or position 0 is
@@ -15,11 +15,12 @@ import numpy as np
 from hydraulic_sim.arrays import Mask
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.records.paired import APART
 from hydraulic_sysid.diagnosis.check import other_stops
 from hydraulic_sysid.estimation.saturation import at_end_of_range
 from hydraulic_sysid.estimation.segments import MEASURED, Segments
 
-SATURATED, STOP, FAR_OFF = "saturated", "stop", "far off"
+SATURATED, STOP, FAR_OFF, DIFFERENT = "saturated", "stop", "far off", "runs apart"
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,10 @@ def set_aside(model: Model, records: Sequence[Record], length: float) -> tuple[l
         for stop in stops:
             found += _noted(record, "position", STOP, stop.near[i] & ~out)
             out |= stop.near[i]
+        if APART in record:
+            apart = np.asarray(record[APART] > 0.0)
+            found += _noted(record, "position", DIFFERENT, apart & ~out)
+            out |= apart
         masks.append(out)
     return masks, found
 

@@ -10,6 +10,7 @@ import numpy as np
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.records.paired import partner_of
 from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import candidates, subsystem
@@ -20,7 +21,7 @@ from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
 from .remainder import NOTHING, Remainder, Spikes, immaterial
 from .search_state import SearchResult
-from .set_aside import FAR_OFF, SATURATED, SetAside
+from .set_aside import DIFFERENT, FAR_OFF, SATURATED, SetAside
 from .whiteness import Whiteness
 
 MISSING = "missing"
@@ -176,7 +177,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     """What a user reads first."""
     base, final = result.before_over_noise.rms_validation, result.final.misfit.rms_validation
     left = " ".join([remainder_sentence(result.remainders), *noise_sentences(result)])
-    aside = set_aside_sentences(result.split.set_aside)
+    aside = [*paired_sentences(result), *set_aside_sentences(result.split.set_aside)]
     fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
     if verdict.kind == UNDECIDED:
         reached = (
@@ -293,11 +294,19 @@ def _spikes(s: Spikes) -> str:
     return f"{what} stand{'s' if one else ''} alone far off the noise, {where}; {out}."
 
 
+def paired_sentences(result: SearchResult) -> list[str]:
+    """Which records are two runs of one command that were read as one."""
+    pairs = [(s.record.name, partner_of(s.record)) for s in result.split.segments if partner_of(s.record) is not None]
+    joined = [f"{one} and {other}" for one, other in pairs]
+    return [f"Runs of one command are read as one, with both pressures: {'; '.join(joined)}."] if joined else []
+
+
 def set_aside_sentences(found: Sequence[SetAside]) -> list[str]:
     """What of the records is not judged, why, and what to mend; one sentence per channel, reason and end."""
     groups: dict[tuple[str, str, bool], list[SetAside]] = {}
     for one in found:
-        groups.setdefault((one.channel, one.reason, one.reason != FAR_OFF and one.reading > 0.0), []).append(one)
+        at_upper_end = one.reason not in (FAR_OFF, DIFFERENT) and one.reading > 0.0
+        groups.setdefault((one.channel, one.reason, at_upper_end), []).append(one)
     said = []
     for (channel, reason, _), every in groups.items():
         at = quantity(float(np.median([a.reading for a in every])), UNITS[channel], 4)
@@ -307,6 +316,8 @@ def set_aside_sentences(found: Sequence[SetAside]) -> list[str]:
                 f"{_first_upper(TITLES[channel])} is clipped at {at}: its converter is at its end for {time} of "
                 f"{_count(every)}. These parts are set aside: enlarge the range."
             )
+        elif reason == DIFFERENT:
+            said.append(f"For {time} of {_count(every)} the two runs move differently: these parts are set aside.")
         elif reason == FAR_OFF:
             said.append(
                 f"{time} of {_count(every)} are far off all else, from {every[0].time:.4g} s of {every[0].record} on, "
