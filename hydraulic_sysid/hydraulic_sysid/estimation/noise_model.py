@@ -217,7 +217,7 @@ def _stands_out(off: Array, noise: ChannelNoise) -> Mask:
 
 
 def mains_lines(residual: Array, dt: float) -> tuple[float, ...]:
-    """Frequencies [Hz] of mains and harmonics that stand out of a residual (N,) over a whole record, 0 where none is."""
+    """Frequencies [Hz] of mains and harmonics that stand out of a residual (N,) over a record, 0 where none is."""
     window = np.hanning(residual.size)
     power = np.abs(np.fft.rfft(residual * window)) ** 2
     frequency = np.fft.rfftfreq(residual.size, dt)

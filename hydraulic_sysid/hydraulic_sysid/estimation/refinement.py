@@ -51,7 +51,7 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
         cleaned = [np.where(spikes[i][:, :, c], 0.0, left[i][:, :, c])[near[i]] for i, c in where]
         known = {f for i, c in where for f in segments[i].hum[c]}
         parts = [segments[i].subset(near[i]) for i, _ in where]
-        lines[channel] = tuple(known) or _lines([_in_place(r, p) for r, p in zip(cleaned, parts, strict=True) if len(p)], dt)
+        lines[channel] = tuple(known) or _lines(list(map(_in_place, cleaned, parts)), dt)
         quiet = [_without(r, lines[channel], part) for r, part in zip(cleaned, parts, strict=True)]
         # Its colour is that of all, each segment brought to the same strength.
         even = noise_model.estimate(quiet, dt)
@@ -166,6 +166,8 @@ def _without(residual: Array, lines: Sequence[float], segments: Segments) -> Arr
 
 def _in_place(residual: Array, segments: Segments) -> Array:
     """Residuals (S, samples) on the record's time, 0 where no segment is: a line keeps its phase over what is out."""
+    if not len(segments):
+        return np.zeros(segments.samples)
     index = segments.first[:, None] + np.arange(segments.samples)
     found = np.zeros(int(np.ptp(index)) + 1)
     found[index - index.min()] = residual - residual.mean()

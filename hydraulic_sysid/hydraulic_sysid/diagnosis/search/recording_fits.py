@@ -107,13 +107,15 @@ class RecordingFits(DataSheetFits):
             self.split = before
 
     def plainest(self, base: SearchState, fits: Sequence[FaultFit]) -> FaultFit:
-        """Of fits with different faults the best; of those that explain much alike, with the data sheet as it is.
+        """Of fits with different faults the best; of gains that explain much alike, with the data sheet as it is.
 
         One transducer that reads too little is the other one that reads too much, with other areas and another supply.
+        Nothing on a data sheet makes a delay look like a low pass.
         """
         best = min(fits, key=lambda f: f.misfit.total)
         worth = NEAR * (base.misfit.total - best.misfit.total)
-        alike = [f for f in fits if base.misfit.total - f.misfit.total >= worth]
+        gains = [f for f in fits if f.fault.unit == best.fault.unit == "1"]
+        alike = [f for f in gains if base.misfit.total - f.misfit.total >= worth]
         if len(alike) < 2 or self._strict(base):
             return best
         before, left = self.split, list[float]()
