@@ -22,7 +22,8 @@ from .uncertainty import parameter_errors
 from .worth import FURTHER
 
 WORSE_LOOK = 0.2  # share by which a look at few segments leaves them more: the fit leads to something worse
-SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one
+SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one, …
+GUESSED = 4  # … unless more than so many are others: then the sheet is a guess, and none can be told from the rest
 CLEAR = 10.0  # times what names a number, beyond which a fit need not show what keeping it costs
 
 
@@ -123,7 +124,7 @@ class DataSheetFits(CandidateFits):
         found = []
         for key in moved:
             same = []
-            for tied in held.instead(key, moved, enough)[:SUSPECTS]:
+            for tied in held.instead(key, moved, enough)[: SUSPECTS if len(moved) <= GUESSED else 0]:
                 state = self.with_moved(final, tied)
                 if not worse(state.misfit, done.misfit):
                     same.append(self.deviation(held, tied[-1], tied, state))
