@@ -217,15 +217,28 @@ def _stands_out(off: Array, noise: ChannelNoise) -> Mask:
 
 
 def mains_lines(residual: Array, dt: float) -> tuple[float, ...]:
-    """Frequencies [Hz] of mains and harmonics that stand out of a residual (N,) over a record, 0 where none is."""
-    window = np.hanning(residual.size)
-    power = np.abs(np.fft.rfft(residual * window)) ** 2
+    """Frequencies [Hz] of mains and harmonics that stand out of a residual (N,) over a record, 0 where none is.
+
+    The strongest first, each taken out before the next is sought: blocks that are left out give it side bands.
+    """
+    window, left = np.hanning(residual.size), residual.copy()
     frequency = np.fft.rfftfreq(residual.size, dt)
     width = max(2.0 / (residual.size * dt), 0.2)
-    found = []
-    for line in (m * h for m in MAINS for h in HARMONICS):
-        off = np.abs(frequency - line)
-        at, beside = off <= width, (off > 2.0 * width) & (off <= 8.0)
-        if line < 0.45 / dt and at.any() and beside.any() and power[at].max() > STANDS_OUT * np.median(power[beside]):
-            found.append(line)
-    return tuple(found)
+    found, open_lines = list[float](), [m * h for m in MAINS for h in HARMONICS if m * h < 0.45 / dt]
+    while True:
+        power = np.abs(np.fft.rfft(left * window)) ** 2
+        heights, places = {}, {}
+        for line in open_lines:
+            off = np.abs(frequency - line)
+            at, beside = off <= width, (off > 2.0 * width) & (off <= 8.0)
+            if at.any() and beside.any():
+                heights[line] = float(power[at].max()) / max(float(np.median(power[beside])), 1e-300)
+                places[line] = float(frequency[at][np.argmax(power[at])])
+        highest = max(heights, key=lambda f: heights[f], default=None)
+        if highest is None or heights[highest] <= STANDS_OUT:
+            return tuple(sorted(found))
+        found.append(highest)
+        open_lines.remove(highest)
+        angle = 2.0 * np.pi * places[highest] * dt * np.arange(residual.size)
+        waves = np.stack((np.sin(angle), np.cos(angle)), axis=1)[residual != 0.0]
+        left[residual != 0.0] -= waves @ np.linalg.lstsq(waves, left[residual != 0.0], rcond=None)[0]
