@@ -87,7 +87,7 @@ def study(data: Path, work: Work) -> list[Row]:
     back = sorted(abs(f) for v, f in seen if v < 0.0)
     files = [path(folder, *which, chamber) for which in FIT for chamber in "AB"]
     words = ["--model", MODELS / "tp511.yaml", "--record", *files, "--columns", COLUMNS]
-    found = work.verb("diagnose", *words, "--within", 200, into="diagnosed")
+    found = work.verb("diagnose", *words, "--within", 400, into="diagnosed")
     verdict, evidence = said(found)
     test = [read(folder, *which, "A") for which in TEST]
     fit = [read(folder, *which, chamber) for which in FIT for chamber in "AB"]
