@@ -26,6 +26,9 @@ CHANNELS: dict[str, Channel] = {
     "reference": Channel("m", "position that a controller was asked to follow"),
 }
 
+CHAMBERS = ("pressure_a", "pressure_b")
+"""The pressures of the two chambers."""
+
 TIME = "time"
 TIME_UNIT = "s"
 

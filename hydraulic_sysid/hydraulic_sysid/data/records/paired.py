@@ -14,11 +14,11 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.data.records.channels import CHAMBERS
 from hydraulic_sysid.data.records.record import Record
 
 APART = "runs_apart"
 """Channel of a pair: 1 where its two runs moved differently, else 0."""
-PRESSURES = ("pressure_a", "pressure_b")
 _SAME_DRIVE = 1e-6  # of its range: what it may differ by, which is rounding
 _NEAR = 0.1  # of the range of the position: root mean square by which the runs may differ
 _OTHER_SPEED = 0.3  # of the highest speed: by how much more the runs move differently
@@ -32,11 +32,12 @@ def paired(records: Sequence[Record]) -> list[Record]:
     for i, record in enumerate(records):
         if i in taken:
             continue
-        partner = next(
-            (k for k in range(i + 1, len(records)) if k not in taken and _of_one_command(record, records[k])), None
-        )
-        taken.add(i if partner is None else partner)
-        found.append(record if partner is None else _joined(record, records[partner]))
+        later = (k for k in range(i + 1, len(records)) if k not in taken)
+        partner = next((k for k in later if _of_one_command(record, records[k])), None)
+        if partner is not None:
+            taken.add(partner)
+            record = _joined(record, records[partner])
+        found.append(record)
     return found
 
 
@@ -47,7 +48,7 @@ def partner_of(record: Record) -> str | None:
 
 
 def _of_one_command(one: Record, other: Record) -> bool:
-    measured = [[c for c in PRESSURES if c in r] for r in (one, other)]
+    measured = [[c for c in CHAMBERS if c in r] for r in (one, other)]
     if sorted(map(len, measured)) != [1, 1] or measured[0] == measured[1]:
         return False
     if len(one) != len(other) or one.dt != other.dt or one.settings != other.settings:
@@ -61,7 +62,7 @@ def _of_one_command(one: Record, other: Record) -> bool:
 
 
 def _joined(one: Record, other: Record) -> Record:
-    channel = next(c for c in PRESSURES if c in other)
+    channel = next(c for c in CHAMBERS if c in other)
     apart = _apart(one["position"], other["position"])
     description = {**one.description, "other_pressure_from": other.name}
     channels = {**one.channels, channel: other[channel], APART: apart}

@@ -17,6 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.display import percent
+from hydraulic_sysid.data.records.channels import CHAMBERS
 from hydraulic_sysid.estimation.levenberg_marquardt import bounded_step
 from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.segments import Segments
@@ -31,7 +32,6 @@ PER_CENT = 0.01
 FILTERED = 0.95  # sampling intervals, or per cent: by less a sound transducer with its filter is late, too …
 ORDER = 0.6  # … and what only another order of conversion would make early
 SAME = 0.05  # sampling intervals by which two delays are one
-PRESSURES = ("pressure_a", "pressure_b")
 
 
 @dataclass(frozen=True)
@@ -79,17 +79,17 @@ class Hypothesis:
 # (sensor_delay, sensor_lag, sensor_scale, command_delay, pressure_offset); one scale of both pressures is that of the
 # supply and the areas.
 HYPOTHESES = (
-    Hypothesis("pressures", PRESSURES, "delay", (1, -1), "the pressures were recorded {size} {late}",
+    Hypothesis("pressures", CHAMBERS, "delay", (1, -1), "the pressures were recorded {size} {late}",
                "shift them, or sample all channels at one instant"),
-    Hypothesis("pressures_low_pass", PRESSURES, "lag", (1,), "the pressures went through a low pass of {corner}",
+    Hypothesis("pressures_low_pass", CHAMBERS, "lag", (1,), "the pressures went through a low pass of {corner}",
                "take the filter out, or use faster transducers"),
     *(Hypothesis(c, (c,), "delay", (1, -1), f"{c} was recorded {{size}} {{late}}",
-                 "shift it, or sample all channels at one instant") for c in PRESSURES),
+                 "shift it, or sample all channels at one instant") for c in CHAMBERS),
     *(Hypothesis(f"{c}_low_pass", (c,), "lag", (1,), f"{c} went through a low pass of {{corner}}",
-                 "take the filter out, or use a faster transducer") for c in PRESSURES),
+                 "take the filter out, or use a faster transducer") for c in CHAMBERS),
     *(Hypothesis(f"{c}_gain", (c,), "gain", (1, -1), f"{c} reads {{size}} too {{much}}",
-                 "calibrate the transducer and its amplifier, or correct scale in the column map") for c in PRESSURES),
-    Hypothesis("drive", ("position", *PRESSURES), "delay", (-1,), "the drive was recorded {size} late",
+                 "calibrate the transducer and its amplifier, or correct scale in the column map") for c in CHAMBERS),
+    Hypothesis("drive", ("position", *CHAMBERS), "delay", (-1,), "the drive was recorded {size} late",
                "record the drive at the instant at which it is put out"),
     Hypothesis("position", ("position",), "delay", (-1,), "the position was recorded {size} early",
                "shift it, or sample all channels at one instant"),
