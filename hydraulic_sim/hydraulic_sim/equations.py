@@ -84,6 +84,7 @@ from hydraulic_sim.kernels import clamp, smooth_root_gain
 
 {functions}
 
+# Arrays are copied element by element: a copy of whole arrays has numba compile the message for those that do not fit.
 NR = {n_rates}
 NX = {n_states}
 
@@ -247,8 +248,10 @@ def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memorie
     for i in range(len(starts)):
         first = starts[i]
         before = max(first - past, 0)
-        X[:] = states[i]
-        M[:] = memories[i]
+        for j in range(len(X)):
+            X[j] = states[i, j]
+        for j in range(len(M)):
+            M[j] = memories[i, j]
         if past > 0:
             prime(drive[before:first], dt, before * dt, on, P, X, M)
         if turning[i] == turning[i]:
@@ -278,7 +281,9 @@ def track(drive, dt, max_step, max_turn, seen, every, starts, on, P, hydraulic, 
             if done < len(ahead):
                 return i
             k += len(ahead)
-        states[i] = X
-        memories[i] = M
+        for j in range(len(X)):
+            states[i, j] = X[j]
+        for j in range(len(M)):
+            memories[i, j] = M[j]
     return len(starts)
 '''

@@ -121,6 +121,17 @@ def test_ranking_takes_the_cause_first_and_gives_a_stand_in_nothing() -> None:
     assert next(b for b in verdict.ranked if b.subsystem == "sensor").alone > 0.6
 
 
+def test_where_the_model_leaves_no_more_than_an_exact_one_there_is_nothing_to_share() -> None:
+    rng = np.random.default_rng(7)
+    x = rng.standard_normal((2, 1, 8000))
+    exact = NormalEquations.of(x, rng.standard_normal((1, 8000)), 200.0)
+    # Less is left than of the exact model, and a little of that goes with the valve.
+    y = 0.9 * rng.standard_normal((1, 8000)) + 0.2 * x[1]
+    verdict = attribute(NormalEquations.of(x, y, 200.0), exact, [PARAMETERS, "valve"], ["", "opening"], [(-1.0, 1.0)])
+    assert verdict.refitted < verdict.exact
+    assert [(b.share, b.alone) for b in verdict.ranked] == [(0.0, 0.0)]
+
+
 def test_verb_writes_document_and_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     records = [str(EXAMPLES / "steps.csv.gz"), str(EXAMPLES / "triangle.csv.gz")]
     call = ["--model", "sample_bench", "--record", *records, "--out", str(tmp_path)]

@@ -113,21 +113,26 @@ def attribute(
     none: Index = np.zeros(0, dtype=np.int64)
     taken, count = none, selection.count
     now, now_reference = refitted, exact = [selection.left(of, none, none) for of in (measured, reference)]
-    excess = max(refitted - exact, 1e-9 * count)
+    least = _LEAST * float(np.log(count))
+    excess = refitted - exact
+
+    def part(reduction: float) -> float:
+        return reduction / excess if excess > least else 0.0  # else nothing is left to share
+
     alone = {n: selection.trial(n, none, refitted, exact) for n in selection.members}
     tried, ranked, rest = alone, list[Share](), list(selection.members)
     while rest and len(ranked) < _MOST:
         best = max(rest, key=lambda n: tried[n].reduction)
         trial = tried[best]
-        if trial.reduction <= max(_LEAST * np.log(count), _SMALL * (now - now_reference)):
+        if trial.reduction <= max(least, _SMALL * (now - now_reference)):
             break
-        share = min(trial.reduction / excess, 1.0 - sum(b.share for b in ranked))
-        ranked.append(Share(best, share, alone[best].reduction / excess, trial.reduction, trial.variables))
+        share = min(part(trial.reduction), 1.0 - sum(b.share for b in ranked))
+        ranked.append(Share(best, share, part(alone[best].reduction), trial.reduction, trial.variables))
         rest.remove(best)
         taken, now, now_reference = np.concatenate((taken, trial.chosen)), trial.left, trial.left_reference
         tried = {n: selection.trial(n, taken, now, now_reference) for n in rest} if len(ranked) < _MOST else {}
     for n in sorted(rest, key=lambda n: -alone[n].reduction):
-        ranked.append(Share(n, 0.0, alone[n].reduction / excess, 0.0, {}))
+        ranked.append(Share(n, 0.0, part(alone[n].reduction), 0.0, {}))
     left = now + (exact - now_reference)
     before = float(measured.square.sum())
     return Attribution(before / count, refitted / count, left / count, exact / count, ranked, count)

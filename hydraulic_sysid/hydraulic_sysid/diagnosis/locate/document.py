@@ -140,7 +140,7 @@ def _shares(found: Attribution) -> list[dict[str, Any]]:
             "alone": s.alone,
             "reduction": s.reduction,
             "variables": s.variables,
-            "indistinguishable": s.alone >= best - _ALIKE,
+            "indistinguishable": best > 0.0 and s.alone >= best - _ALIKE,
         }
         for s in found.ranked
     ]
