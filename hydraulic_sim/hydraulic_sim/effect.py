@@ -88,8 +88,10 @@ class Effect:
     (for a relaxation state two: its rate and its target). ``memory`` is the number of values kept between samples.
     ``order`` sorts effects within a slot. ``step_rate`` estimates the fastest rate [1/s] that the effect brings, from
     parameters alone, so that the integrator's step can follow it; ``reach`` says how far back [s] its memory must go
-    (one value per sample; without it the memory may keep what is long past). ``always_on`` marks base physics. ``wear``
-    says what of a machine ages where the effect grows; empty where nothing does.
+    (one value per sample; without it the memory may keep what is long past). ``begins_shown``: the memory of a position
+    sensor may begin as if all had always moved like now (memory[0] is 0), or with what the sensor showed (memory[0] is
+    −1, memory[1] that [m], memory[2] its noise over the usual acceleration [s²]). ``always_on`` marks base physics.
+    ``wear`` says what of a machine ages where the effect grows; empty where nothing does.
     ``alike_without_pressures`` names the family whose members drive and position alone cannot distinguish. ``kinds``:
     of plants in which it can act. ``searched``: whether a diagnosis may find it missing; how a machine is built
     (a controller inside, a load that was put on) is for the model file to say.
@@ -112,6 +114,7 @@ class Effect:
     order: int = 0
     step_rate: Callable | None = None
     reach: Callable | None = None
+    begins_shown: bool = False
     always_on: bool = False
     wear: str = ""
     kinds: tuple[str, ...] = ("hydraulic", "mechanical")

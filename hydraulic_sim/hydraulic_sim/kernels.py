@@ -52,3 +52,14 @@ def delayed(value: float, delay: float, dt: float, memory) -> float:
     newer = memory[1 + (count - whole + size) % size]
     older = memory[1 + (count - whole - 1 + size) % size]
     return (1.0 - part) * newer + part * older
+
+
+@njit(error_model="numpy")
+def begun(guess: float, reach: float, memory) -> float:
+    """With what a sensor of the position begins: what it showed, or the ``guess`` as far as noise hides the difference.
+
+    That is ``reach`` [s²] times an acceleration. memory[1] is what it showed, memory[2] the noise over the usual
+    acceleration [s²]: the mean of both, each with the weight of its variance.
+    """
+    hidden = memory[2]
+    return guess + (memory[1] - guess) * reach * reach / (reach * reach + hidden * hidden)

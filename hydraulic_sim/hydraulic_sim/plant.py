@@ -236,6 +236,7 @@ class Plant:
         initial_states: ArrayLike,
         memories: Array | None = None,
         turning: ArrayLike | None = None,
+        shown: tuple[Array, float] | None = None,
     ) -> dict[str, Array]:
         """Many short runs over one drive, each from a state of its own.
 
@@ -243,7 +244,8 @@ class Plant:
         ``initial_states`` (S, n_states). Returns channel → (S, horizon + 1), column 0 being the start itself.
         Effects on the command remember the drive before each start, or begin with ``memories`` (S, n_memory) as
         `track` gives them. Where ``turning`` (S,) is an acceleration [m/s²], dry friction begins with what that asks
-        for, as far as it can; NaN: with the state ``stick``.
+        for, as far as it can; NaN: with the state ``stick``. ``shown``: what the position's sensor showed at the starts
+        (S,) [m], and its noise over the usual acceleration [s²]; its memory then begins with that.
 
         :raises SimulationError: as `simulate` does.
         """
@@ -264,6 +266,8 @@ class Plant:
         past = LONGEST_MEMORY if self._remembers and memories is None else 0
         if memories is None:
             memories = np.zeros((len(first), self.layout.n_memory))
+        if shown is not None:
+            memories = self._with_shown(memories, *shown)
         asked = np.full(len(first), np.nan) if turning is None else np.require(turning, np.float64, ("C", "W"))
         done = self._compiled.run_many(
             u, dt, self.longest_step, self._turn, first, horizon + 1, past, states, memories, asked,
@@ -279,6 +283,15 @@ class Plant:
                 f"{self.model.name!r}: a sensor reads nothing finite at sample {first[i] + k}: {out[i, k, :_READINGS]}"
             )
         return {name: out[:, :, i] for i, name in enumerate(base.OUTPUTS)}
+
+    def _with_shown(self, memories: Array, reading: Array, hidden: float) -> Array:
+        """Memories (S, n_memory) in which those of the position's sensor begin with what it showed (S,)."""
+        able = [e for e in self._active if e.begins_shown]
+        if able:
+            start = self.layout.memories[max(able, key=lambda e: e.order).name].start  # what it gives is what is shown
+            memories = memories.copy()
+            memories[:, start], memories[:, start + 1], memories[:, start + 2] = -1.0, reading, hidden
+        return memories
 
     @property
     def has_inner_states(self) -> bool:

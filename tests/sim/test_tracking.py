@@ -37,6 +37,46 @@ def test_runs_from_within_a_record_go_on_as_the_whole_did(bench: Model, effect: 
     assert np.abs(again["position"] - whole).max() < 0.01 * moved
 
 
+@pytest.mark.parametrize(
+    ("effect", "values", "left"),
+    [
+        ("sensor_lag", {"time": 9e-3}, 1e-9),
+        ("sensor_backlash", {"half_gap": 5e-4}, 1e-9),
+        ("sensor_delay", {"delay": 6.4e-3}, 0.75),  # the way between is taken to be a parabola
+    ],
+)
+def test_a_sensor_goes_on_from_what_it_showed(bench: Model, effect: str, values: dict[str, float], left: float) -> None:
+    """A wild drive, so that in the middle of it nothing has always moved like now; ``left``: of the error without."""
+    plant = Plant(bench.without_effect("coulomb_friction").with_effect(effect, values))  # which has a state of its own
+    drive = np.repeat(np.random.default_rng(5).uniform(-6.0, 6.0, 60), 25)
+    run = plant.simulate(drive, DT)
+    starts = np.arange(40, len(drive) - 101, 100)
+    true = plant.with_parameters({f"{effect}.{name}": 0.0 for name in values}).simulate(drive, DT)
+    assert np.allclose(true.true_position, run.true_position, atol=1e-12)
+    states = np.tile(plant.initial_state().states, (len(starts), 1))
+    for k, column in enumerate((true.true_position, true.velocity, true.true_pressure_a, true.true_pressure_b)):
+        states[:, k] = column[starts]
+    whole = np.stack([run.position[s : s + 101] for s in starts])
+    errors = [
+        np.abs(plant.predict(drive, DT, starts, 100, states, shown=shown)["position"] - whole).max()
+        for shown in (None, (run.position[starts], 1e-12))
+    ]
+    assert errors[0] > 1e-5
+    assert errors[1] < max(left * errors[0], 1e-12)
+
+
+def test_a_sensor_with_nothing_to_remember_does_not_mind_what_it_showed(bench: Model) -> None:
+    drive = np.full(50, 1.0)
+    states = np.tile(Plant(bench).initial_state(velocity=0.1).states, (1, 1))
+    for name, parameter in (("sensor_lag", "time"), ("sensor_backlash", "half_gap"), ("sensor_delay", "delay")):
+        plant = Plant(bench.with_effect(name, {parameter: 0.0}))
+        shown = (np.array([0.3]), 1e-6)
+        assert np.array_equal(
+            plant.predict(drive, DT, [0], 40, states, shown=shown)["position"],
+            plant.predict(drive, DT, [0], 40, states)["position"],
+        )
+
+
 def test_what_forgets_soon_needs_no_leading(bench: Model) -> None:
     assert not Plant(bench).has_inner_states
     assert not Plant(bench.with_effect("command_delay")).has_inner_states

@@ -12,9 +12,9 @@ from hydraulic_sim.kernels import play
 
 
 def lag_behind(reading, memory, velocity, half_gap):
-    if memory[0] == 0.0:
-        memory[0] = 1.0
+    if memory[0] == 0.0:  # on the side where the motion presses it, or with what it showed
         memory[1] = reading - math.copysign(half_gap, velocity) if velocity != 0.0 else reading
+    memory[0] = 1.0
     memory[1] = play(reading, half_gap, memory[1])
     return memory[1]
 
@@ -23,7 +23,7 @@ EFFECT = Effect(
     slot="position_sensor",
     summary="play in the position sensor's linkage",
     kernel=lag_behind,
-    memory=2,
+    memory=3,
     parameters=(
         Parameter("half_gap", "m", 2e-4, (0.0, 0.02), "half the play", "ball joints of a sensor rod: 0.05 to 0.5 mm",
                   null=0.0),
@@ -34,4 +34,5 @@ EFFECT = Effect(
     confused_with=("backlash", "valve_hysteresis"),
     distinguished_by="the pressures show motion that the position does not",
     order=1,
+    begins_shown=True,
 )

@@ -6,15 +6,20 @@ Source: Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4 (sensors and bus).
 """
 
 from hydraulic_sim.effect import Effect, Parameter
-from hydraulic_sim.kernels import delayed
+from hydraulic_sim.kernels import begun, delayed
 
 
 def delay_reading(reading, memory, dt, velocity, delay):
-    if memory[0] == 0.0:  # as if it had always moved like this
+    if memory[0] <= 0.0:
+        bend = 0.0  # as if it had always moved like this, or so that it shows what it showed
+        if memory[0] < 0.0 and delay > 0.0:
+            straight = reading - velocity * delay
+            bend = (begun(straight, 0.5 * delay * delay, memory) - straight) / (delay * max(delay, dt))
         size = len(memory) - 1
         memory[0] = 1.0 * size
         for back in range(size):
-            memory[1 + (size - back) % size] = reading - velocity * back * dt
+            ago = back * dt
+            memory[1 + (size - back) % size] = reading - velocity * ago + bend * ago * min(ago, delay)
     return delayed(reading, delay, dt, memory)
 
 
@@ -32,6 +37,7 @@ EFFECT = Effect(
     confused_with=("command_delay", "sensor_lag", "spool_dynamics"),
     alike_without_pressures="lag",
     distinguished_by="the pressures lead the position, over frequency",
-    order=10,
+    order=60,
     reach=lambda p: p["delay"],
+    begins_shown=True,
 )

@@ -8,16 +8,20 @@ Source: Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4 (LVDT demodulator)
 import math
 
 from hydraulic_sim.effect import Effect, Parameter
+from hydraulic_sim.kernels import begun
 
 
 def follow(reading, memory, dt, velocity, time):
     if time <= 0.0:
         return reading
-    if memory[0] == 0.0:
+    if memory[0] <= 0.0:
+        begin = reading - velocity * time  # as if it had always moved like this
+        if memory[0] < 0.0:
+            begin = begun(begin, time * time, memory)
         memory[0] = 1.0
-        memory[1] = reading - velocity * time  # as if it had always moved like this
+        memory[1] = begin
         memory[2] = reading
-        return memory[1]
+        return begin
     slope = (reading - memory[2]) / dt
     fade = math.exp(-dt / time)
     memory[1] = reading - slope * time + (memory[1] - memory[2] + slope * time) * fade
@@ -39,5 +43,6 @@ EFFECT = Effect(
     confused_with=("spool_dynamics", "sensor_delay", "command_delay"),
     alike_without_pressures="lag",
     distinguished_by="the pressures lead the position",
-    order=5,
+    order=50,
+    begins_shown=True,
 )

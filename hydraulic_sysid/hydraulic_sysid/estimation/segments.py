@@ -235,6 +235,21 @@ class Segments:
         slope = np.polynomial.polynomial.polyfit(self.record.dt * np.arange(2 * ahead + 1), velocity[inside].T, 1)[1]
         return np.where(slow[:, 0], np.where(slow.all(axis=1), 0.0, slope), np.nan)
 
+    @cached_property
+    def shown(self) -> tuple[Array, float] | None:
+        """(S,) what the position's sensor showed where segments begin [m], and its noise over the usual acceleration.
+
+        None where it was recorded behind a low pass.
+        """
+        channel = self.channels.index("position")
+        reading = self.readings[channel]
+        if reading.lag > 0.0:
+            return None
+        position, velocity = (self.smoothed[:, _STATES.index(name)] for name in ("position", "velocity"))
+        usual = float(np.sqrt(np.mean(np.gradient(velocity, self.record.dt) ** 2)))
+        shown = position[self.first] / (1.0 + reading.gain) + reading.delay * velocity[self.first]
+        return shown, float(self.noise_std[channel]) / max(usual, 1e-300)
+
     @property
     def tracked(self) -> list[int]:
         """States that are pressures without a sensor."""

@@ -201,8 +201,9 @@ class Shooting:
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.drive if drive is None else drive
         run = self._beside(plant, i).predict(
-            drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, segments.turning
-        )
+            drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, segments.turning,
+            segments.shown,
+        )  # fmt: skip
         return np.stack([run[c] for c in segments.channels], axis=-1)
 
     def _inner(self, plant: Plant, i: int) -> Inner:

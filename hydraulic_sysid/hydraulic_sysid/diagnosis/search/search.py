@@ -150,7 +150,7 @@ class Search(RecordingFits):
             added.append(new_effect(better, path[-1]))
             self.path = [*path, better]
             self.say.reached(added, better.misfit)
-            nothing = better.misfit.variance - 1.0 < NOTHING_LEFT
+            nothing = self.nothing_left(better)
             last = len(added) == MOST_EFFECTS and explained(base.misfit, better.misfit) > MOSTLY
             # What was judged by a model that lacked it would ask for further effects.
             again = None if last or better.misfit.variance >= FAR_OFF else self.judged_anew(better)

@@ -141,11 +141,15 @@ def decisive(found: SearchResult) -> SearchResult:
 
 
 def needless(found: SearchResult, name: str) -> bool:
-    """Whether nothing is left without an effect, either; what the records show by themselves is there all the same."""
+    """Whether nothing is left without an effect, either; what the records show by themselves is there all the same.
+
+    A noise that was judged without it has it in itself: then it counts what the effect leaves.
+    """
     without = found.competing.get(name)
     if without is None or without is found.base or observed(found.model.library[name]):
         return False
-    return without.misfit.variance - 1.0 < NOTHING_LEFT
+    noise = min(found.final.misfit.squares, float(without.misfit.count))
+    return without.misfit.squares - noise < NOTHING_LEFT * without.misfit.count
 
 
 def vague(found: SearchResult, name: str) -> bool:
