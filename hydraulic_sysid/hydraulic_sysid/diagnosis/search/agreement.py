@@ -25,8 +25,11 @@ def agreed(before: Sequence[Array], after: Sequence[Array], fit: Sequence[Mask])
     :param after: the same of the other model
     :param fit: (S,) which segments were fitted, per record
     """
-    fitted = np.concatenate(list(fit))
-    own, size = _in_segments(before, after)
+    return sure(*_in_segments(before, after), np.concatenate(list(fit)))
+
+
+def sure(own: Array, size: Array, fitted: Mask) -> bool:
+    """The same of what `agreement` takes, of all segments; ``fitted`` (S,): which were."""
     confirmed = fitted.all() or agreement(own[~fitted], size[~fitted]) > CONFIRMED
     return bool(agreement(own[fitted], size[fitted]) > AGREED and confirmed)
 

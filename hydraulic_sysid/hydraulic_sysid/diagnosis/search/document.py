@@ -116,6 +116,7 @@ def document(
             {"channel": r.channel, "beyond_noise": r.beyond, "noise": r.noise, "motion": r.motion, "share": r.share}
             for r in result.remainders
         ],
+        "drift": None if result.drift is None else vars(result.drift),
         "parameters": _parameters(final.model, known, final.linearisation.parameters.keys),
         "unexplained_share": result.unexplained_share,
         "nonparametric_curves": [_curve(c) for c in curves],
@@ -168,7 +169,7 @@ def with_balances(
     later = {b["name"]: b["ratio"] for b in after}
     keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
     rows = [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]
-    clear = any(c["explained_share"] > _CLEAR for c in whole["nonparametric_curves"][:1])
+    clear = any(c["explained_share"] > _CLEAR for c in whole["nonparametric_curves"][:1]) or bool(whole["drift"])
     where = suspected[0] if suspected and not clear else whole["verdict"]["subsystem"]
     return {**whole, "balances": rows, "verdict": {**whole["verdict"], "subsystem": where}}
 

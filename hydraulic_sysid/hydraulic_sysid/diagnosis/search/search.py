@@ -9,6 +9,7 @@ it builds on stands in layers: `fitting`, `candidate_fits`, `data_sheet_fits`, `
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -22,6 +23,7 @@ from hydraulic_sysid.estimation.refinement import outlying
 
 from .candidate_fits import LATER_REFITS
 from .data_sheet_fits import new_effect
+from .drift import drift
 from .errors import DiagnosisError
 from .fitting import FAR_OFF, Task, quieter, retimed
 from .misfit import Misfit, explained, material
@@ -34,6 +36,7 @@ from .spectral_lines import record_features
 from .worth import (
     MOSTLY,
     NOTHING_LEFT,
+    PROMISES,
     anything,
     decisive,
     enough_at_first,
@@ -73,11 +76,18 @@ class Search(RecordingFits):
             found = accidents_named(self.set_against_faults(self.concluded(decisive(self.searched()))))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)
-            return found
+            return self.followed(found)
         except (OutOfTimeError, KeyboardInterrupt):
             if not self.path:
                 raise
             return self.so_far()
+
+    def followed(self, found: SearchResult) -> SearchResult:
+        """With the parameter of its final model that changes along the records, if there is one."""
+        self.say("whether any parameter changes along the records")
+        with suppress(SimulationError):  # a parameter cannot be moved
+            return replace(found, drift=drift(found.final.linearisation, PROMISES * found.final.misfit.least))
+        return found
 
     def so_far(self) -> SearchResult:
         """The best so far: effects added, and the best of those that were tried next, fitted."""

@@ -14,6 +14,7 @@ from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.segments import Segments
 
 from .data_sheet import Deviation
+from .drift import Drift
 from .frozen_jacobian import Refit
 from .holdout import Split
 from .linearisation import Linearisation
@@ -79,8 +80,8 @@ class SearchResult:
 
     ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
     ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the state
-    before any fault of the recording was assumed; ``faults_instead`` and ``numbers_instead``: that explain what the one
-    effect added does, the latter only together.
+    before any fault of the recording was assumed; ``drift``: of the final model along the records; ``faults_instead``
+    and ``numbers_instead``: that explain what the one effect added does, the latter only together.
     """
 
     model: Model
@@ -95,6 +96,7 @@ class SearchResult:
     faults_instead: Sequence[RecordingFault] = ()
     numbers_instead: Sequence[Deviation] = ()
     as_recorded: SearchState | None = None
+    drift: Drift | None = None
     stopped: bool = False
     """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""
 

@@ -16,6 +16,7 @@ from hydraulic_sysid.estimation.parameters import Parameters
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
 from .data_sheet import Deviation
+from .drift import Drift
 from .drive_faults import DriveHypothesis
 from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
@@ -77,7 +78,7 @@ def conclusive(result: SearchResult) -> SearchResult:
     """
     vague = drive_unknown(result) and (result.base.misfit.variance < VAGUE or kind_of(result, tied=False) == OUTSIDE)
     if result.added and vague:
-        return replace(result, final=result.base, misfits={}, competing={}, faults_instead=())
+        return replace(result, final=result.base, misfits={}, competing={}, faults_instead=(), drift=None)
     return result
 
 
@@ -130,6 +131,8 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     """
     if result.stopped:
         return UNDECIDED
+    if result.drift is not None and not drive_unknown(result):
+        return OUTSIDE
     final = result.final.misfit
     little = final.little or immaterial(final, result.remainders)
     if not result.added:
@@ -168,6 +171,8 @@ def strained(result: SearchResult) -> bool:
 
 def place(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str | None:
     """The subsystem of the first effect added, or of the curve that explains most of what no effect does."""
+    if verdict.kind == OUTSIDE and result.drift is not None and "." in result.drift.key:
+        return subsystem(result.model.library[result.drift.key.partition(".")[0]])
     if verdict.kind == OUTSIDE:
         return curves[0].subsystem if curves else None
     return subsystem(result.model.library[result.added[0]]) if result.added else None
@@ -212,17 +217,25 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         why = " Pressures would: without them these act alike on the position." if verdict.family else ""
         faults = "".join(f", or nothing is, and {f.text}" for f in result.faults_instead)
         return " ".join([f"Missing: {_and(parts)}{faults}. These data cannot distinguish them. {fell}{why}", *beside])
-    text = "Outside the library: no effect of it explains what is left. "
+    none = "no effect of it explains what is left"
+    text = f"Outside the library: {none if result.drift is None else _changes(result, result.drift)}. "
     if result.added:
         text += f"The nearest is {_and(result.added)}. {fell} "
     else:
         text += f"On validation data the residual is {final:.3g} × noise. "
-    if curves:
+    if curves and result.drift is None:
         best = curves[0]
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
         text += f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
     # Not what the numbers of the data sheet were bent to: they imitate what no effect explains.
     return " ".join([text.strip(), *recording_sentences(result), *aside])
+
+
+def _changes(result: SearchResult, d: Drift) -> str:
+    unit, sign = result.model.parameter(d.key).unit, "+" if d.change > 0.0 else ""
+    by = f"{sign}{quantity(d.change, unit, 2, error=d.standard_error)}"
+    mean = quantity(d.value, unit, 3)
+    return f"{d.key} changes along the records, by {by} from beginning to end ({mean} in the mean), as no effect does"
 
 
 def remainder_sentence(found: Sequence[Remainder]) -> str:
