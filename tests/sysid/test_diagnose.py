@@ -372,6 +372,14 @@ def test_a_small_remainder_does_not_take_back_what_is_said_of_the_recording(mode
     assert "dead_volume_a" not in verdict.sentences(much, verdict.judge(much), []), "bent to what is not known"
 
 
+@pytest.mark.parametrize(("share", "kind"), [(0.05, verdict.MISSING), (0.15, verdict.OUTSIDE)])
+def test_what_leaves_more_than_a_law_is_off_is_a_proxy(model, share: float, kind: str) -> None:
+    base = state(model, 3000 * 9.0, {})
+    final = state(model.with_effect("backlash"), 3000 * (1.0 + 8.0 * share), {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"backlash": final.misfit}, {})
+    assert verdict.kind_of(found, tied=False) == kind
+
+
 def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:
     assert not Deviation("dead_volume_a", 200e-6, 202e-6, 2.1e-6, 2000.0).sure
     assert Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0).sure

@@ -40,6 +40,7 @@ NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
 VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
+BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to 15 %
 UNATTRIBUTED = 0.1  # of what is left: a curve that explains less of it shows no law that is missing
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
@@ -143,7 +144,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     if little:
         return INDISTINGUISHABLE if tied else MISSING
     details = final.variance < SMALL or (bool(curves) and all(c.share < UNATTRIBUTED for c in curves))
-    allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if details else UNEXPLAINED
+    allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if details else BESIDE
     if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
     return INDISTINGUISHABLE if tied else MISSING
