@@ -46,7 +46,7 @@ from .worth import (
     worth_adding,
 )
 
-MOST_EFFECTS = 3
+MOST_EFFECTS = 6
 MOST_SWAPS = 3
 
 
