@@ -200,8 +200,8 @@ def test_what_a_law_leaves_is_no_effect(model, name: str, left: float, absorbs: 
     [
         (1.39, 1.12, verdict.MISSING),  # near the noise a law may leave more …
         (1.39, 1.19, verdict.OUTSIDE),  # … but not all it likes
-        (10.0, 3.3, verdict.OUTSIDE),
-        (10.0, 2.5, verdict.MISSING),
+        (10.0, 2.5, verdict.OUTSIDE),
+        (10.0, 1.7, verdict.MISSING),
     ],
 )
 def test_what_an_effect_leaves_decides_whether_it_is_the_one(model, before: float, after: float, kind: str) -> None:
@@ -284,11 +284,21 @@ def test_a_small_further_effect_that_may_be_anything_is_not_named(
     assert kept.misfits[kept.added[-1]] == kept.final.misfit
 
 
-@pytest.mark.parametrize(("name", "kept"), [("sensor_lag", False), ("sensor_quantisation", True)])
-def test_an_effect_without_which_nothing_is_left_either_is_not_missing(model, name: str, kept: bool) -> None:
+@pytest.mark.parametrize(
+    ("name", "without", "left", "kept"),
+    [
+        ("sensor_lag", 1.004, 0.999, False),
+        ("sensor_quantisation", 1.004, 0.999, True),
+        ("sensor_lag", 0.98, 0.978, False),
+        ("sensor_lag", 0.98, 0.95, True),  # the noise, judged without it, had it in itself
+    ],
+)
+def test_an_effect_without_which_nothing_is_left_either_is_not_missing(
+    model, name: str, without: float, left: float, kept: bool
+) -> None:
     one = model.with_effect("constant_load")
-    base, before = state(model, 3000 * 60.0, {}), state(one, 3000 * 0.98, {})
-    final = state(one.with_effect(name), 3000 * 0.95, {})
+    base, before = state(model, 3000 * 60.0, {}), state(one, 3000 * without, {})
+    final = state(one.with_effect(name), 3000 * left, {})
     misfits = {"constant_load": before.misfit, name: final.misfit}
     found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {name: before})
     assert decisive(found).added == ["constant_load", name][: 1 + kept]
@@ -370,14 +380,6 @@ def test_a_small_remainder_does_not_take_back_what_is_said_of_the_recording(mode
     assert late.text in verdict.sentences(much, verdict.judge(much), []), "it is said all the same"
     much = replace(much, moved=(Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0),))
     assert "dead_volume_a" not in verdict.sentences(much, verdict.judge(much), []), "bent to what is not known"
-
-
-@pytest.mark.parametrize(("share", "kind"), [(0.05, verdict.MISSING), (0.15, verdict.OUTSIDE)])
-def test_what_leaves_more_than_a_law_is_off_is_a_proxy(model, share: float, kind: str) -> None:
-    base = state(model, 3000 * 9.0, {})
-    final = state(model.with_effect("backlash"), 3000 * (1.0 + 8.0 * share), {})
-    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"backlash": final.misfit}, {})
-    assert verdict.kind_of(found, tied=False) == kind
 
 
 def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:

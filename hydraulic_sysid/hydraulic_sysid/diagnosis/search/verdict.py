@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hydraulic_sim.effect import Effect
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity
 from hydraulic_sysid.data.records import Record
@@ -44,6 +45,7 @@ BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to
 UNATTRIBUTED = 0.1  # of what is left: a curve that explains less of it shows no law that is missing
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
+IN_LINE = ("valve", "sensor")  # subsystems that a signal passes on its way from the command to what is read
 BELOW = 0.9  # residual over noise below which the noise model is doubted
 
 
@@ -110,15 +112,19 @@ def alternatives(result: SearchResult, verdict: Verdict) -> dict[str, Model]:
 def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dict[str, list[str]]:
     """Effects added → those that these channels cannot distinguish from them.
 
-    Without pressures a family of effects acts alike on the position, up to parameters that no record shows.
+    Without pressures a family of effects acts alike on the position, up to parameters that no record shows. Where the
+    drive is the force itself, only those do that lie in line with the motion: before it, or behind it.
     """
-    if model.kind != "hydraulic" or any(c.startswith("pressure_") for c in channels):
+    if any(c.startswith("pressure_") for c in channels):
         return {}
-    off = [e for e in candidates(model) if e.alike_without_pressures]
-    found = {}
+
+    def alike(effect: Effect) -> str:
+        return effect.alike_without_pressures if model.kind == "hydraulic" or subsystem(effect) in IN_LINE else ""
+
+    off, found = candidates(model), {}
     for name in added:
-        family = model.library[name].alike_without_pressures
-        same = [e.name for e in off if family and e.alike_without_pressures == family and e.name not in added]
+        family = alike(model.library[name])
+        same = [e.name for e in off if family and alike(e) == family and e.name not in added]
         if same:
             found[name] = same
     return found
