@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -573,6 +574,13 @@ def test_without_pressures_a_family_of_effects_is_named_whole(model) -> None:
         "spool_dynamics",
         "sensor_delay",
     }
+
+
+def test_where_the_drive_is_the_force_only_what_lies_in_line_with_the_motion_acts_alike() -> None:
+    axis = load_model(Path(__file__).parents[2] / "benchmarks" / "measured" / "models" / "mts.yaml")
+    found = verdict.families(axis, ["command_delay", "coulomb_friction", "constant_load"], ["position"])
+    assert set(found) == {"command_delay"}
+    assert set(found["command_delay"]) == {"spool_dynamics", "sensor_lag", "sensor_delay"}
 
 
 def test_unusable_input_is_named(model) -> None:
