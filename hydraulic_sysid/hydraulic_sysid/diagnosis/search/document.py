@@ -169,7 +169,8 @@ def with_balances(
     later = {b["name"]: b["ratio"] for b in after}
     keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
     rows = [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]
-    clear = any(c["explained_share"] > _CLEAR for c in whole["nonparametric_curves"][:1]) or bool(whole["drift"])
+    clear = any(c["explained_share"] > _CLEAR for c in whole["nonparametric_curves"][:1])
+    clear = clear or (whole["drift"] is not None and "." in whole["drift"]["key"])  # which says whose it is
     where = suspected[0] if suspected and not clear else whole["verdict"]["subsystem"]
     return {**whole, "balances": rows, "verdict": {**whole["verdict"], "subsystem": where}}
 

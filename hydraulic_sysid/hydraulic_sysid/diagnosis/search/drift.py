@@ -64,7 +64,7 @@ def drift(at: Linearisation, least: float) -> Drift | None:
         return None
     reduction, j, slope, total, agreed = max(found)
     key, value, scale = parameters.keys[j], float(parameters.values[j]), float(parameters.scales[j])
-    share = slope * scale / max(abs(value - (at.model.parameter(key).null or 0.0)), 1e-300)
+    share = slope * scale / max(abs(value - (at.model.parameter(key).null or 0.0)), LEAST * scale)
     if not agreed or reduction < least or abs(share) < LEAST:
         return None
     return Drift(key, value, slope * scale, scale / total**0.5, share)

@@ -160,12 +160,12 @@ class Search(RecordingFits):
             added.append(new_effect(better, path[-1]))
             self.path = [*path, better]
             self.say.reached(added, better.misfit)
-            nothing = self.nothing_left(better)
             last = len(added) == MOST_EFFECTS and explained(base.misfit, better.misfit) > MOSTLY
             # What was judged by a model that lacked it would ask for further effects.
             again = None if last or better.misfit.variance >= FAR_OFF else self.judged_anew(better)
             if again is not None:
                 return self.onward(base, base.model, again)
+            nothing = self.nothing_left(better)
             path.append(better if nothing or last else self.explore(better, most=LATER_REFITS))
             if nothing:
                 break
