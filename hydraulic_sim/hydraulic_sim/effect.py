@@ -130,6 +130,11 @@ class Effect:
             raise EffectError(f"effect {self.name or '?'}: states and a dynamics kernel go together")
         if not self.always_on and all(p.null is None for p in self.parameters):
             raise EffectError(f"effect {self.name or '?'}: no parameter has a null value")
+        if self.begins_shown and (self.slot != "position_sensor" or self.memory < 3):
+            raise EffectError(
+                f"effect {self.name or '?'}: begins_shown in slot {self.slot!r} with memory {self.memory}: it is for a "
+                "position_sensor with a memory of 3 or more"
+            )
         for text in ("summary", "equation", "source", "excited_by", "distinguished_by"):
             if not getattr(self, text).strip():
                 raise EffectError(f"effect {self.name or '?'}: {text} is empty")

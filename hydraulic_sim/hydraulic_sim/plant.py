@@ -266,7 +266,7 @@ class Plant:
         past = LONGEST_MEMORY if self._remembers and memories is None else 0
         if memories is None:
             memories = np.zeros((len(first), self.layout.n_memory))
-        if shown is not None:
+        if shown is not None and self.begins_shown:
             memories = self._with_shown(memories, *shown)
         asked = np.full(len(first), np.nan) if turning is None else np.require(turning, np.float64, ("C", "W"))
         done = self._compiled.run_many(
@@ -286,12 +286,16 @@ class Plant:
 
     def _with_shown(self, memories: Array, reading: Array, hidden: float) -> Array:
         """Memories (S, n_memory) in which those of the position's sensor begin with what it showed (S,)."""
-        able = [e for e in self._active if e.begins_shown]
-        if able:
-            start = self.layout.memories[max(able, key=lambda e: e.order).name].start  # what it gives is what is shown
-            memories = memories.copy()
-            memories[:, start], memories[:, start + 1], memories[:, start + 2] = -1.0, reading, hidden
+        last = max((e for e in self._active if e.begins_shown), key=lambda e: e.order)  # what it gives is what is shown
+        start = self.layout.memories[last.name].start
+        memories = memories.copy()
+        memories[:, start], memories[:, start + 1], memories[:, start + 2] = -1.0, reading, hidden
         return memories
+
+    @property
+    def begins_shown(self) -> bool:
+        """Whether the memory of a position sensor may begin with what the sensor showed."""
+        return any(e.begins_shown for e in self._active)
 
     @property
     def has_inner_states(self) -> bool:

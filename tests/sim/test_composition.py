@@ -84,6 +84,10 @@ WRONG = {
     "use of an unknown effect": (
         "def kernel(level, size):\n    return level", "force", "uses={'level': 'coulomb.level'},",
         "unknown effect 'coulomb'"),
+    "what was shown in too short a memory": (
+        "def kernel(reading, memory, size):\n    return reading", "position_sensor", "memory=2, begins_shown=True,",
+        "with memory 2: it is for a position_sensor with a memory of 3"),
+    "what was shown elsewhere": (GOOD, "force", "begins_shown=True,", "begins_shown in slot 'force'"),
     "no Python": ("def kernel(size) return size", "force", "", "SyntaxError"),
     "a unit nobody knows": (GOOD, "force", "unit", "unit 'furlongz'"),
 }  # fmt: skip

@@ -201,6 +201,7 @@ def test_what_a_law_leaves_is_no_effect(model, name: str, left: float, absorbs: 
     [
         (1.39, 1.12, verdict.MISSING),  # near the noise a law may leave more …
         (1.39, 1.19, verdict.OUTSIDE),  # … but not all it likes
+        (10.0, 3.3, verdict.OUTSIDE),
         (10.0, 2.5, verdict.OUTSIDE),
         (10.0, 1.7, verdict.MISSING),
     ],

@@ -46,7 +46,7 @@ def record(model: Model, change: float, seed: int) -> Record:
 def followed(model: Model, change: float) -> SearchResult:
     search = Search.of(model, [record(model, change, seed) for seed in (1, 2)], (), FitSettings(), lambda text: None)
     state = search.judged(search.state(model))
-    return search.followed(SearchResult(model, search.split, FitSettings(), state, state, {}, {}))
+    return search.with_drift(SearchResult(model, search.split, FitSettings(), state, state, {}, {}))
 
 
 @pytest.mark.parametrize("change", [0.01, -0.006])

@@ -202,7 +202,7 @@ class Shooting:
         drive = segments.drive if drive is None else drive
         run = self._beside(plant, i).predict(
             drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, segments.turning,
-            segments.shown,
+            segments.shown if plant.begins_shown else None,
         )  # fmt: skip
         return np.stack([run[c] for c in segments.channels], axis=-1)
 

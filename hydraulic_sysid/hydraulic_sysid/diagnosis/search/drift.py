@@ -47,25 +47,22 @@ def drift(at: Linearisation, least: float) -> Drift | None:
         ((s.first + 0.5 * s.samples) / len(s.record) - 0.5)[:, None, None] * c[..., laws]
         for s, c in zip(at.split.segments, columns, strict=True)
     ]
-    trends, size = at.point.beyond(late), len(parameters)
+    first = len(parameters)
     information = at.bordered(late).information
-    own = np.linalg.pinv(information[:size, :size], rcond=1e-12, hermitian=True) @ information[:size, size:]
+    own = np.linalg.pinv(information[:first, :first], rcond=1e-12, hermitian=True) @ information[:first, first:]
+    # What of the lines neither initial states nor other values of the parameters can explain.
+    lines = at.point.beyond([line - c @ own for line, c in zip(late, columns, strict=True)])
+    along = np.concatenate([np.einsum("smq,sm->sq", x, r) for x, r in zip(lines, at.residual, strict=True)])
+    squares = np.concatenate([np.sum(x**2, axis=1) for x in lines])
     fitted = np.concatenate(at.split.fit)
-    found = []
-    for place, j in enumerate(laws):
-        seen = [t[..., place] - b @ own[:, place] for t, b in zip(trends, at.beyond, strict=True)]
-        along = np.concatenate([np.sum(r * x, axis=1) for r, x in zip(at.residual, seen, strict=True)])
-        squares = np.concatenate([np.sum(x**2, axis=1) for x in seen])
-        total = float(squares[fitted].sum())
-        if total > 0.0:
-            slope = -float(along[fitted].sum()) / total
-            found.append((slope**2 * total, j, slope, total, sure(-slope * along, slope**2 * squares, fitted)))
-    if not found:
-        return None
-    reduction, j, slope, total, agreed = max(found)
+    total = np.maximum(squares[fitted].sum(axis=0), 1e-300)
+    slope = -along[fitted].sum(axis=0) / total
+    best = int(np.argmax(slope**2 * total))
+    j, by, size = laws[best], float(slope[best]), float(total[best])
     key, value, scale = parameters.keys[j], float(parameters.values[j]), float(parameters.scales[j])
-    share = slope * scale / max(abs(value - (at.model.parameter(key).null or 0.0)), LEAST * scale)
-    if not agreed or reduction < least or abs(share) < LEAST:
+    share = by * scale / max(abs(value - (at.model.parameter(key).null or 0.0)), LEAST * scale)
+    if by**2 * size < least or abs(share) < LEAST:
         return None
-    return Drift(key, value, slope * scale, scale / total**0.5, share)
-
+    if not sure(-by * along[:, best], by**2 * squares[:, best], fitted):
+        return None
+    return Drift(key, value, by * scale, scale / size**0.5, share)

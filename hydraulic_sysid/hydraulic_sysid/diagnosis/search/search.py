@@ -76,13 +76,13 @@ class Search(RecordingFits):
             found = accidents_named(self.set_against_faults(self.concluded(decisive(self.searched()))))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)
-            return self.followed(found)
+            return self.with_drift(found)
         except (OutOfTimeError, KeyboardInterrupt):
             if not self.path:
                 raise
             return self.so_far()
 
-    def followed(self, found: SearchResult) -> SearchResult:
+    def with_drift(self, found: SearchResult) -> SearchResult:
         """With the parameter of its final model that changes along the records, if there is one."""
         self.say("whether any parameter changes along the records")
         with suppress(SimulationError):  # a parameter cannot be moved

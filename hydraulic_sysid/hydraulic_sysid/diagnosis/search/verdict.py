@@ -221,7 +221,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         for name in result.added:
             same = verdict.indistinguishable_from(name)
             parts.append(f"one of {{{', '.join([name, *same])}}}" if same else name)
-        why = _alike(result.model) if verdict.family else ""
+        why = _why_alike(result.model) if verdict.family else ""
         faults = "".join(f", or nothing is, and {f.text}" for f in result.faults_instead)
         return " ".join([f"Missing: {_and(parts)}{faults}. These data cannot distinguish them. {fell}{why}", *beside])
     none = "no effect of it explains what is left"
@@ -238,7 +238,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     return " ".join([text.strip(), *recording_sentences(result), *aside])
 
 
-def _alike(model: Model) -> str:
+def _why_alike(model: Model) -> str:
     if model.kind == "hydraulic":
         return " Pressures would: without them these act alike on the position."
     return " Before the motion or behind it, they act alike on the position."
