@@ -65,7 +65,7 @@ def document(
         },
         "verdict": {
             "kind": verdict.kind,
-            "level": "explained" if explained and verdict.kind != UNDECIDED else "off" if outside else "close",
+            "level": "off" if outside else "explained" if explained and verdict.kind != UNDECIDED else "close",
             "effects": verdict.possible,
             "subsystem": verdicts.place(result, verdict, curves),
             "text": verdicts.sentences(result, verdict, curves) + verdicts.warning(verdict.possible, imitations),
