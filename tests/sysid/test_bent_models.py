@@ -19,6 +19,7 @@ from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit
 from hydraulic_sysid.diagnosis.search.score_test import score
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
+from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.recording import Reading
 
 DT, SECONDS = 1e-3, 6.0
@@ -61,6 +62,24 @@ def test_sizes_that_are_shares_are_known_beforehand_to_be_small(model: Model) ->
     assert (mean, std) == (1.0, pytest.approx(PLAUSIBLE * (scale.default - 1.0)))
     assert "sensor_scale.scale" not in priors(model.with_effect("sensor_scale"))  # its file's own
     assert not any(key.startswith(("coulomb_friction.", "hose_compliance.")) for key in known)  # sizes of the plant
+
+
+def test_an_angle_goes_on_at_the_other_bound(model: Model) -> None:
+    rippled = model.with_effect("pump_ripple", {"phase": 6.5, "amplitude": 1e5})
+    at = Parameters.of(rippled, ["pump_ripple.phase", "pump_ripple.amplitude"])
+    down, up = at.reach
+    assert (down[0], up[0]) == (-np.inf, np.inf) and down[1] == pytest.approx(-1e5 / at.scales[1])
+    phase, amplitude = at.moved(np.array([1.0, -5e5]) / at.scales).values
+    assert phase == pytest.approx(7.5 - 2.0 * np.pi) and amplitude == 0.0  # the same angle; a bound is one
+    phase, _ = at.moved(np.array([0.2, 0.0]) / at.scales).values
+    assert phase == pytest.approx(6.7)  # within its range it stays as it is
+    assert not at.moved(np.array([0.5, 0.0]) / at.scales).at_bound
+
+
+def test_an_angle_that_does_not_go_round_stops_at_its_bound(model: Model) -> None:
+    rippled = model.with_effect("pump_ripple", {"phase": 0.0}).with_entry("pump_ripple.phase", bounds=(-1.0, 1.0))
+    at = Parameters.of(rippled, ["pump_ripple.phase"]).moved(np.array([1e3]))
+    assert at.values[0] == 1.0 and at.at_bound == {"pump_ripple.phase": "highest"}
 
 
 def late(at: Split, by: float) -> Split:

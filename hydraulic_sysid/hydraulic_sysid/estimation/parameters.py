@@ -15,6 +15,7 @@ Priors = Mapping[str, tuple[float, float]]
 """What is known of parameters beforehand: key → mean and standard deviation [SI]."""
 NO_PRIORS: Priors = {}
 _SCATTER = 2.0  # factor by which a plant may be off a data sheet that states no bounds
+_TURN = 2.0 * np.pi
 _AT_BOUND = 1e-6  # distance from a bound, of the scale
 
 
@@ -47,7 +48,8 @@ def bounded(model: Model) -> Model:
 class Parameters:
     """Parameters of a fit: ``values``, ``scales``, ``low`` and ``high`` bounds, each (P,), physical ones in SI.
 
-    What is known beforehand: normal priors around ``mean`` with ``std`` (P,), infinite where nothing is.
+    What is known beforehand: normal priors around ``mean`` with ``std`` (P,), infinite where nothing is. An angle that
+    may go all the way round has a ``period`` (P,), all others an infinite one: it goes on at the other bound.
     """
 
     keys: tuple[str, ...]
@@ -57,6 +59,7 @@ class Parameters:
     high: Array
     mean: Array
     std: Array
+    period: Array
 
     @classmethod
     def of(cls, model: Model, keys: Iterable[str], priors: Priors = NO_PRIORS) -> Parameters:
@@ -65,14 +68,16 @@ class Parameters:
         low, high = np.array([model.entry(k).bounds for k in keys], dtype=float).reshape(-1, 2).T
         values = np.array([model.value(k) for k in keys], dtype=float)
         known = np.array([priors.get(k, (0.0, np.inf)) for k in keys], dtype=float).reshape(-1, 2)
-        return cls(keys, values, np.array([scale(model, k) for k in keys], dtype=float), low, high, *known.T)
+        turns = [model.parameter(k).unit == "rad" and h - w >= _TURN for k, w, h in zip(keys, low, high, strict=True)]
+        scales = np.array([scale(model, k) for k in keys], dtype=float)
+        return cls(keys, values, scales, low, high, *known.T, np.where(turns, _TURN, np.inf))
 
     @classmethod
     def unbounded(cls, values: Array) -> Parameters:
         """Numbers that may be anything, of scale one."""
         infinite = np.full(values.size, np.inf)
         names = tuple(map(str, range(values.size)))
-        return cls(names, values, np.ones(values.size), -infinite, infinite, values, infinite)
+        return cls(names, values, np.ones(values.size), -infinite, infinite, values, infinite, infinite)
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -91,7 +96,7 @@ class Parameters:
 
     @property
     def _arrays(self) -> tuple[Array, ...]:
-        return self.values, self.scales, self.low, self.high, self.mean, self.std
+        return self.values, self.scales, self.low, self.high, self.mean, self.std, self.period
 
     @property
     def prior_cost(self) -> float:
@@ -115,12 +120,17 @@ class Parameters:
 
     def moved(self, change: Array) -> Parameters:
         """Changed by so many scales (P,), within the bounds."""
-        return replace(self, values=np.clip(self.values + change * self.scales, self.low, self.high))
+        values = self.values + change * self.scales
+        round_it = np.isfinite(self.period) & ((values < self.low) | (values > self.high))
+        middle, turn = (0.5 * (self.low + self.high))[round_it], self.period[round_it]
+        values[round_it] -= turn * np.round((values[round_it] - middle) / turn)
+        return replace(self, values=np.clip(values, self.low, self.high))
 
     @property
     def reach(self) -> tuple[Array, Array]:
         """How far (P,) each may go down and up, in its scale."""
-        return (self.low - self.values) / self.scales, (self.high - self.values) / self.scales
+        ends = np.where(np.isfinite(self.period), np.inf, 0.0)
+        return (self.low - ends - self.values) / self.scales, (self.high + ends - self.values) / self.scales
 
     @property
     def at_bound(self) -> dict[str, str]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
+from hydraulic_sim.effect import Effect
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sysid.estimation.parallel import results
 
@@ -24,9 +26,11 @@ MOST_REFITS = 8
 LATER_REFITS = 4  # once something was added, …
 ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
 FULL = 2  # candidates that are refitted from more than one start, and with all sensitivities taken anew
-OTHERS = 3  # candidates of other subsystems, that are set against those where the data sheet is bent to its bounds
+OTHERS = 3  # further candidates, that are set against the nearest where a quick refit is no sure guide
 NEAR = 0.93  # of the best reduction, from which a refit is finished
 PROMISED = 0.5  # of what an effect must explain, or of what a number explains, which must show for a fit to its end
+
+T = TypeVar("T")
 
 
 class CandidateFits(Fitting):
@@ -73,7 +77,7 @@ class CandidateFits(Fitting):
         least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)
         # What rounding explains shows once the initial states have settled with it.
         worth = [s for s in scores if s.reduction > least or observed(s.effect)]
-        best = varied(worth, ALIKE if most < MOST_REFITS else most)[:most]
+        best = varied(worth, [s.effect for s in worth], ALIKE if most < MOST_REFITS else most)[:most]
         every: list[CandidateRefit] = []
         self.tried = (base, every)
         self._show(base, scores, every)
@@ -140,7 +144,7 @@ class CandidateFits(Fitting):
         near = [r for r in worth if base.misfit.total - r.misfit.total >= NEAR * top]
         near = [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][:FULL]
         found = []
-        for tried in self.set_against_other_subsystems(base, near):
+        for tried in self.set_against_others(base, near):
             self.say(f"fitting with {tried.name}")
             try:
                 state = self.begun_anew(self.state(tried.refit.model, self._last))
@@ -150,23 +154,25 @@ class CandidateFits(Fitting):
                 found.append(state)
         return min(found, key=lambda s: s.misfit.total, default=None)
 
-    def set_against_other_subsystems(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
+    def set_against_others(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
         """The refits to finish: the nearest, or what explains more once all parameters are free.
 
         A model whose data sheet is bent to its bounds imitates what it lacks, and from there a frozen Jacobian does not
-        lead back. The best of every other subsystem is then fitted to a few segments, too, before one is chosen.
+        lead back; nor does it lead to the end where even the nearest leaves a good part. Others, no more than a few of
+        one subsystem, are then fitted to a few segments, too, before one is chosen.
         """
-        at_bound, library = base.linearisation.parameters.at_bound, base.model.library
-        seen, others = {subsystem(library[r.name]) for r in near}, list[CandidateRefit]()
-        for r in base.refits:
-            if subsystem(library[r.name]) not in seen:
-                seen.add(subsystem(library[r.name]))
-                others.append(r)
-        if not others or not any("." not in key and key in self.priors for key in at_bound):
+        bent = any("." not in key and key in self.priors for key in base.linearisation.parameters.at_bound)
+        if not bent and near[0].misfit.excess <= (1.0 - NEAR) * base.misfit.excess:
+            return list(near)
+        names = {r.name for r in near}
+        every = [*near, *(r for r in base.refits if r.name not in names)]
+        every = varied(every, [base.model.library[r.name] for r in every], ALIKE)
+        others = [r for r in every if r.name not in names][:OTHERS]
+        if not others:
             return list(near)
         found = []
-        for r in [*near, *others[:OTHERS]]:
-            self.say(f"setting {r.name} against effects of other subsystems")
+        for r in [*near, *others]:
+            self.say(f"setting {r.name} against others")
             try:
                 done = self.fitted_to(self.split.some(ENOUGH), r.refit.model, self._few)
             except SimulationError:
@@ -177,7 +183,7 @@ class CandidateFits(Fitting):
         return [r for _, r in found[:FULL]] or list(near)
 
 
-def varied(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
-    """In their order, and no more than so many of one subsystem."""
-    places = [subsystem(f.effect) for f in found]
+def varied(found: Sequence[T], effects: Sequence[Effect], most: int) -> list[T]:
+    """What was ``found``, in its order, no more than so many whose ``effects`` belong to one subsystem."""
+    places = [subsystem(e) for e in effects]
     return [f for i, f in enumerate(found) if places[:i].count(places[i]) < most]

@@ -123,7 +123,7 @@ def _predict(at: Linearisation, model: Model, effect: Effect, group: list[Probe]
     reach = np.array([_reach(effect, p) for p in group])
     none, one = np.zeros(usable.size), np.ones(usable.size)
     low, high = reach.T
-    units = Parameters(tuple(p.moved for p in group), none, one, low, high, none, np.inf * one)
+    units = Parameters(tuple(p.moved for p in group), none, one, low, high, none, np.inf * one, np.inf * one)
     change = bounded_step(normal, at.parameters + units)
     alone = normal.subset(np.arange(own))
     gain = normal.reduction(change) - alone.reduction(bounded_step(alone, at.parameters))
