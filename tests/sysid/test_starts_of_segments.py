@@ -14,7 +14,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.known_starts import KnownStarts
-from hydraulic_sysid.estimation.segments import Segments, cut
+from hydraulic_sysid.estimation.segments import STICK_SPEED, Segments, cut
 from hydraulic_sysid.estimation.shooting import Shooting
 
 DT, SECONDS = 1e-3, 16.0
@@ -55,17 +55,33 @@ def worst(point: FitPoint) -> float:
 def test_a_segment_that_is_held_by_dry_friction_does_not_ring(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     held = worst(FitPoint.begin(Plant.for_fits(model), rests(model, quiet=0.1), ()).at_rest())
     segments = rests(model, quiet=0.1)
-    monkeypatch.setattr(Segments, "turning", np.full(len(segments[0]), np.nan))
+    monkeypatch.setattr(Segments, "turning", lambda s, _: np.full(len(s), np.nan))
     ringing = worst(FitPoint.begin(Plant.for_fits(model), segments, ()).at_rest())
     assert ringing > 3.0
     assert held < 1.5
 
 
+@pytest.mark.parametrize(("volts", "noise", "known"), [(0.02, 1e-8, True), (-0.02, 1e-8, True), (0.02, 1e-4, False)])
+def test_a_creeping_piston_has_its_dry_friction_in_full(model: Model, volts: float, noise: float, known: bool) -> None:
+    """Below the speed from which friction has its direction, but many bristle lengths on; noise may hide that."""
+    plant, n = Plant.for_fits(model), round(4.0 / DT)
+    run, draw = Plant(model).simulate(np.full(n, volts), DT), np.random.default_rng(1)
+    position = run["position"] + noise * draw.standard_normal(n)
+    channels = {"position": position, "pressure_a": run["pressure_a"], "pressure_b": run["pressure_b"]}
+    (s,) = cut([Record.sampled("creep", DT, {"drive": np.full(n, volts), **channels})], "hydraulic", 0.5)
+    stick = s.initial_states(plant)[:, plant.state_names.index("stick")]
+    late = s.first > 1.0 / DT
+    assert 0.0 < np.abs(run["velocity"][s.first[late]]).max() < STICK_SPEED
+    assert np.isnan(s.turning(plant)[late]).all() == known
+    assert (stick[late] == np.sign(volts)).all() == known
+
+
 def test_without_dry_friction_nothing_is_held(model: Model, segments: list[Segments]) -> None:
     plant, (s,) = Plant.for_fits(model.without_effect("coulomb_friction")), segments
-    assert 0 < np.isfinite(s.turning).sum() < len(s)
+    turning = s.turning(plant)
+    assert 0 < np.isfinite(turning).sum() < len(s)
     states = s.initial_states(plant)
-    runs = [plant.predict(s.record["drive"], DT, s.first, 50, states, turning=a) for a in (None, s.turning)]
+    runs = [plant.predict(s.record["drive"], DT, s.first, 50, states, turning=a) for a in (None, turning)]
     assert all(np.array_equal(runs[0][c], runs[1][c]) for c in NOISE)
 
 

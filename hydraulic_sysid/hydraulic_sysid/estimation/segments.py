@@ -39,6 +39,9 @@ _FEWEST = 20  # samples of a segment
 _SMOOTHING = 15  # samples of the quadratic through which initial values are read
 STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
 _TURNING = 0.005  # s: over twice that the acceleration of a piston that hardly moves is read
+_SLIDING = 0.05  # s before a segment in which a piston that hardly moves has slid on, …
+_SLID = 3.0  # … if it went so many bristle lengths …
+_SEEN = 5.0  # … and as many times the position's noise
 # Of the noise: how far what a sensor reads in an initial state may be off what was measured there. The samples of the
 # segment hold the initial state anyway.
 _PRIOR = {"position": 1000.0, "pressure_a": 200.0, "pressure_b": 200.0}
@@ -207,7 +210,9 @@ class Segments:
             if name in _STATES:
                 states[:, column] = np.where(np.isfinite(begin[:, column]), begin[:, column], 0.0)
             elif name == "stick":
-                states[:, column] = np.clip(begin[:, _STATES.index("velocity")] / STICK_SPEED, -1.0, 1.0)
+                slid = self._slid(plant.value("bristle_length"))
+                partly = np.clip(begin[:, _STATES.index("velocity")] / STICK_SPEED, -1.0, 1.0)
+                states[:, column] = np.where(slid != 0.0, slid, partly)
             elif plant.layout.state_records[name].initial == "command":
                 states[:, column] = command[np.maximum(self.first - 1, 0)]
         return states
@@ -223,12 +228,24 @@ class Segments:
             [n.colour(white[:, :, c] * self.loudness[:, c, None]) for c, n in enumerate(self.noise)], axis=-1
         )
 
-    @cached_property
-    def turning(self) -> Array:
+    def turning(self, plant: Plant) -> Array:
         """(S,) acceleration with which segments begin [m/s²] whose piston hardly moves there, NaN for the others.
 
-        It is read from what follows, as before that the piston may have braked; 0 where it stays at rest.
+        It is read from what follows, as before that the piston may have braked; 0 where it stays at rest. One that
+        creeps has its dry friction in full.
         """
+        return np.where(self._slid(plant.value("bristle_length")) != 0.0, np.nan, self._turning)
+
+    def _slid(self, length: float) -> Array:
+        """(S,) the direction in which the piston has slid on by bristles of this ``length`` [m], or 0."""
+        position, velocity = (self.smoothed[:, _STATES.index(name)] for name in ("position", "velocity"))
+        before = np.maximum(self.first - round(_SLIDING / self.record.dt), 0)
+        way = position[self.first] - position[before]
+        far = max(_SLID * length, _SEEN * float(self.noise_std[self.channels.index("position")]))
+        return np.where((np.abs(way) > far) & (way * velocity[self.first] > 0.0), np.sign(way), 0.0)
+
+    @cached_property
+    def _turning(self) -> Array:
         velocity, ahead = self.smoothed[:, _STATES.index("velocity")], max(1, round(_TURNING / self.record.dt))
         inside = np.minimum(self.first[:, None] + np.arange(2 * ahead + 1), len(velocity) - 1)
         slow = np.abs(velocity[inside]) < STICK_SPEED

@@ -200,8 +200,9 @@ class Shooting:
         segments = self.segments[i]
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.drive if drive is None else drive
+        turning = segments.turning(self.plant)
         run = self._beside(plant, i).predict(
-            drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, segments.turning,
+            drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, turning,
             segments.shown if plant.begins_shown else None,
         )  # fmt: skip
         return np.stack([run[c] for c in segments.channels], axis=-1)
