@@ -7,6 +7,8 @@ Source: Jelali & Kroll (2003), Hydraulic Servo-systems, ch. 4 (power supply).
 
 from hydraulic_sim.effect import Effect, Parameter, State
 
+SMALL_DROP = 1e5  # Pa over the lands, below which nobody sees how the flow drawn follows the supply pressure
+
 
 def supply(line_pressure):
     return max(line_pressure, 0.0)
@@ -34,6 +36,7 @@ EFFECT = Effect(
     distinguished_by="slow against fast large strokes",
     # the flow drawn falls with the supply pressure, most at a small drop over the lands
     step_rate=lambda p: (
-        p["resistance"] * p["valve_flow"] / (p["valve_drop"] * p["orifice_transition"]) ** 0.5 / p["time"]
+        p["resistance"] * p["valve_flow"] / p["time"]
+        / (p["valve_drop"] * max(p["orifice_transition"], SMALL_DROP)) ** 0.5
     ),
 )

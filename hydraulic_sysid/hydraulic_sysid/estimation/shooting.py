@@ -21,7 +21,7 @@ from .segments import Segments
 T = TypeVar("T")
 
 _MOST_KNOWN = 256  # propagations along a record that are kept
-_STIFFEST = 10.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
+_STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
 _STEP = 2e-3  # difference step of a parameter, of its value, …
 _LEAST_STEP = 0.1  # … or of so much of its scale
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel

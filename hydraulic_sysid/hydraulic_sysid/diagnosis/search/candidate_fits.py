@@ -180,7 +180,7 @@ class CandidateFits(Fitting):
             fitted = replace(r.refit, model=r.refit.model.with_values(done.values))
             found.append((done.point.cost, replace(r, refit=fitted)))
         found.sort(key=lambda pair: pair[0])
-        return [r for _, r in found[:FULL]] or list(near)
+        return [r for cost, r in found[:FULL] if cost <= FAR * found[0][0]] or list(near)
 
 
 def varied(found: Sequence[T], effects: Sequence[Effect], most: int) -> list[T]:
