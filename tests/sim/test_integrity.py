@@ -157,6 +157,18 @@ def test_a_light_piston_on_stiff_oil_is_followed(bare: Model, mass: float) -> No
     assert plant.step_error(np.full(400, -2.0), DT, plant.initial_state(position=0.74))["position"] < 1e-3
 
 
+@pytest.mark.parametrize(("resistance", "time"), [(2.5e9, 1e-3), (4e8, 1e-3), (7e8, 0.02)])
+def test_a_fast_droop_is_followed_in_steps_that_are_not_too_short(bare: Model, resistance: float, time: float) -> None:
+    """What drops below 1 bar over the lands add to its rate is a hundredth of a sensor's noise (2·10⁴ Pa) at most."""
+    droop = bare.with_effect("supply_droop", {"resistance": resistance, "time": time})
+    model = droop.with_values({"orifice_transition": 100.0})
+    fine = Plant(model, longest_step=1e-5)
+    assert fine.longest_step < 0.5 * Plant(model).longest_step < Plant.for_fits(model).longest_step
+    exact = fine.simulate(steps(), DT)
+    for plant, close in ((Plant(model), 40.0), (Plant.for_fits(model), 300.0)):
+        assert np.sqrt(np.mean((plant.simulate(steps(), DT).pressure_a - exact.pressure_a) ** 2)) < close
+
+
 def test_a_fit_that_makes_the_physics_faster_keeps_the_step_with_it(bare: Model) -> None:
     plant = Plant(bare.with_effect("spool_dynamics", {"frequency": 40.0}))
     fast = plant.with_parameters({"spool_dynamics.frequency": 990.0, "spool_dynamics.damping": 1.8})
