@@ -19,7 +19,7 @@ from .fitting import FAR_OFF, worse
 from .misfit import explained, reduction
 from .search_state import SearchResult, SearchState
 from .uncertainty import parameter_errors
-from .worth import FURTHER
+from .worth import FURTHER, PROMISES
 
 WORSE_LOOK = 0.2  # share by which a look at few segments leaves them more: the fit leads to something worse
 SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one, …
@@ -67,9 +67,10 @@ class DataSheetFits(CandidateFits):
             places = [self.in_place_of(strict, done, [d], moved) for d in moved]
             every = [(state, i) for i, (_, states) in enumerate(places) for state in states]
             best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
-            clear = CLEAR * least_cost(done.misfit.count, done.misfit.variance)
             # All numbers together may do what an effect does, too.
-            if min(done.misfit.total, final.misfit.total) - best.misfit.total > clear:
+            nearest = min((done, final), key=lambda s: s.misfit.total)
+            clear = PROMISES * nearest.misfit.least
+            if nearest.misfit.total - best.misfit.total > clear and self.better(nearest, best):
                 name = new_effect(best, strict)
                 return replace(
                     found, base=strict, final=best, misfits={name: best.misfit}, competing={name: places[place][0]},
