@@ -67,10 +67,10 @@ class Parameters:
         keys = tuple(keys)
         low, high = np.array([model.entry(k).bounds for k in keys], dtype=float).reshape(-1, 2).T
         values = np.array([model.value(k) for k in keys], dtype=float)
-        known = np.array([priors.get(k, (0.0, np.inf)) for k in keys], dtype=float).reshape(-1, 2)
+        mean, std = np.array([priors.get(k, (0.0, np.inf)) for k in keys], dtype=float).reshape(-1, 2).T
         turns = [model.parameter(k).unit == "rad" and h - w >= _TURN for k, w, h in zip(keys, low, high, strict=True)]
         scales = np.array([scale(model, k) for k in keys], dtype=float)
-        return cls(keys, values, scales, low, high, *known.T, np.where(turns, _TURN, np.inf))
+        return cls(keys, values, scales, low, high, mean, std, np.where(turns, _TURN, np.inf))
 
     @classmethod
     def unbounded(cls, values: Array) -> Parameters:
