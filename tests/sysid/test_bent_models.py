@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -12,12 +13,15 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
-from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, priors
+from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, Deviation, priors
+from hydraulic_sysid.diagnosis.search.data_sheet_fits import DataSheetFits
 from hydraulic_sysid.diagnosis.search.fitting import retimed
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit
 from hydraulic_sysid.diagnosis.search.score_test import score
+from hydraulic_sysid.diagnosis.search.search_state import SearchResult, SearchState
+from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.recording import Reading
@@ -94,3 +98,44 @@ def test_a_delay_that_the_noise_hides_asks_for_no_other_judgement(model: Model) 
     for split_, means in ((seen, True), (deaf, False)):
         assert retimed(split_, late(split_, 0.2 * DT)) is means
         assert not retimed(split_, late(split_, 0.01 * DT))
+
+
+class OneWrongNumber(DataSheetFits):
+    """A search whose fits are known: an area is off, or friction leaves ``less`` of the squares instead."""
+
+    def __init__(self, model: Model, less: float, agreed: bool = True) -> None:
+        def state(model: Model, squares: float) -> SearchState:
+            return SearchState(model, cast(Linearisation, None), Misfit(squares, 0.0, 40_000, 0), [])
+
+        self.agreed = agreed
+        self.strict, self.loose = state(model, 48_000.0), state(model, 39_500.0)
+        self.effect = state(model.with_effect("friction_asymmetry"), 39_500.0 - less)
+
+    def _strict(self, base: SearchState) -> bool:
+        return base is not self.loose
+
+    def with_moved(self, state: SearchState, moved: object) -> SearchState:
+        return self.strict
+
+    def fewest_moved(self, final: SearchState, strict: object) -> tuple[SearchState, list[Deviation]]:
+        return self.loose, [Deviation("piston_area_b", 1.0, 1.1, 0.01, 8000.0)]
+
+    def in_place_of(self, *_: object) -> tuple[SearchState, list[SearchState]]:
+        return self.strict, [self.effect]
+
+    def better(self, before: SearchState, after: SearchState) -> bool:
+        return self.agreed
+
+    @property
+    def named(self) -> tuple[list[str], list[str]]:
+        """Effects and numbers of the verdict."""
+        found = self.concluded(SearchResult(
+            self.strict.model, cast(Split, None), FitSettings(), self.loose, self.loose, {}, {},
+        ))  # fmt: skip
+        return list(found.misfits), [d.key for d in found.moved]
+
+
+def test_an_effect_that_leaves_less_than_the_whole_data_sheet_is_the_verdict(model: Model) -> None:
+    assert OneWrongNumber(model, less=400.0).named == (["friction_asymmetry"], [])
+    assert OneWrongNumber(model, less=40.0).named == ([], ["piston_area_b"])  # it may be either
+    assert OneWrongNumber(model, less=400.0, agreed=False).named == ([], ["piston_area_b"])
