@@ -39,9 +39,9 @@ _FEWEST = 20  # samples of a segment
 _SMOOTHING = 15  # samples of the quadratic through which initial values are read
 STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
 _TURNING = 0.005  # s: over twice that the acceleration of a piston that hardly moves is read
-_SLIDING = 0.05  # s before a segment in which a piston that hardly moves has slid on, …
-_SLID = 3.0  # … if it went so many bristle lengths …
-_SEEN = 5.0  # … and as many times the position's noise
+_SLIDING = 0.05  # s around the beginning of a segment over which a piston that hardly moves slides on, …
+_SLID = 3.0  # … if it goes so many bristle lengths, half of them before …
+_SEEN = 5.0  # … and so many times the position's noise
 # Of the noise: how far what a sensor reads in an initial state may be off what was measured there. The samples of the
 # segment hold the initial state anyway.
 _PRIOR = {"position": 1000.0, "pressure_a": 200.0, "pressure_b": 200.0}
@@ -237,12 +237,16 @@ class Segments:
         return np.where(self._slid(plant.value("bristle_length")) != 0.0, np.nan, self._turning)
 
     def _slid(self, length: float) -> Array:
-        """(S,) the direction in which the piston has slid on by bristles of this ``length`` [m], or 0."""
-        position, velocity = (self.smoothed[:, _STATES.index(name)] for name in ("position", "velocity"))
-        before = np.maximum(self.first - round(_SLIDING / self.record.dt), 0)
-        way = position[self.first] - position[before]
-        far = max(_SLID * length, _SEEN * float(self.noise_std[self.channels.index("position")]))
-        return np.where((np.abs(way) > far) & (way * velocity[self.first] > 0.0), np.sign(way), 0.0)
+        """(S,) the direction in which the piston slides on by bristles of this ``length`` [m], or 0.
+
+        It must do so before a segment and go on with it: one that comes to rest bends them back.
+        """
+        position, channel = self.smoothed[:, _STATES.index("position")], self.channels.index("position")
+        half = max(1, round(0.5 * _SLIDING / self.record.dt))
+        before, after = np.maximum(self.first - half, 0), np.minimum(self.first + half, len(position) - 1)
+        ways = np.stack([position[self.first] - position[before], position[after] - position[self.first]])
+        far = 0.5 * max(_SLID * length, _SEEN * float(self.noise_std[channel]))
+        return np.where((ways > far).all(axis=0), 1.0, np.where((ways < -far).all(axis=0), -1.0, 0.0))
 
     @cached_property
     def _turning(self) -> Array:
