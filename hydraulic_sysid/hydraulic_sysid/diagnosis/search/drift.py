@@ -40,7 +40,8 @@ def drift(at: Linearisation, least: float) -> Drift | None:
     And more than laws may be off anyway, and if segments agree on it. ``least``: reduction of the sum of squares.
     """
     parameters, columns = at.parameters, at.columns
-    laws = [j for j, key in enumerate(parameters.keys) if not at.model.parameter(key).nuisance]
+    angles = np.isfinite(parameters.period)  # one that goes round is a frequency that is another
+    laws = [j for j, k in enumerate(parameters.keys) if not (at.model.parameter(k).nuisance or angles[j])]
     if not laws:
         return None
     late = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
@@ -18,7 +19,7 @@ from .misfit import explained, material, misfit
 from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import negligible
 from .search_state import FaultFit, SearchResult, SearchState
-from .worth import FURTHER, NOTHING_LEFT, PROMISES, leaves_most
+from .worth import FURTHER, NOTHING_LEFT, PROMISES, enough_at_first, leaves_most
 
 MOST_FAULTS = 3  # of the recording
 UNNOTICED = 0.003  # of the motion in a segment: what leaves less is no disturbance of the drive
@@ -70,6 +71,10 @@ class RecordingFits(DataSheetFits):
             if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
                 break
             if leaves_most(base.misfit, found.misfit) or base.misfit.fit - found.misfit.fit < least:
+                break
+            # A quick refit falls short of what an effect explains; the fault has been fitted to the end.
+            effect = self.finish(base, partial(enough_at_first, base))
+            if effect is not None and effect.misfit.total < found.misfit.total:
                 break
             # Filters of sound transducers delay by a part of a sampling interval, too: that is known, but not named.
             if not base.misfit.little or found.fault.unusual(self.split.interval):
