@@ -68,3 +68,16 @@ def test_a_parameter_that_changes_along_the_records_is_named(model: Model, chang
 def test_one_that_stays_or_that_a_law_may_be_off_anyway_is_not(model: Model, change: float) -> None:
     result = followed(model, change)
     assert result.drift is None and verdict.judge(result).kind == verdict.COMPLETE
+
+
+def test_a_phase_that_drifts_is_another_frequency(model: Model) -> None:
+    """A ripple of 5 Hz that was taken for one of 5.01 Hz, a full radian over the record."""
+    hertz, keys = {"amplitude": 5e5, "phase": 1.0}, ("pump_ripple.phase", "pump_ripple.frequency")
+    truth = model.with_effect("pump_ripple", {**hertz, "frequency": 5.0})
+    taken = model.with_effect("pump_ripple", {**hertz, "frequency": 5.01}).with_entry(keys[1], free=False)
+    assert taken.entry(keys[0]).free
+    search = Search.of(taken, [record(truth, 0.0, seed) for seed in (1, 2)], (), FitSettings(), lambda text: None)
+    state = search.state(taken)
+    assert state.misfit.variance > 1.05
+    found = search.with_drift(SearchResult(taken, search.split, FitSettings(), state, state, {}, {})).drift
+    assert found is None or not found.key.startswith("pump_ripple.phase")
