@@ -39,7 +39,8 @@ DECIDED = (MISSING, COMPLETE, DATA_SHEET, RECORDING)
 MANY_SPIKES = 1e-4  # of all samples: more are a fault of the recording
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
-VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave
+VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave, …
+MUCH = 4.0  # … and from which on it is not what is wrong
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
 BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to 15 %
 UNATTRIBUTED = 0.1  # of what is left: a curve that explains less of it shows no law that is missing
@@ -79,7 +80,7 @@ def conclusive(result: SearchResult) -> SearchResult:
 
     That is where they leave much, or where there was little left for them to explain.
     """
-    vague = drive_unknown(result) and (result.base.misfit.variance < VAGUE or kind_of(result, tied=False) == OUTSIDE)
+    vague = drive_blamed(result) and (result.base.misfit.variance < VAGUE or kind_of(result, tied=False) == OUTSIDE)
     if result.added and vague:
         return replace(result, final=result.base, misfits={}, competing={}, faults_instead=(), drift=None)
     return result
@@ -145,7 +146,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     if not result.added:
         # Faults of the recording may have explained the most of it.
         if not little and result.unexplained_share > UNEXPLAINED:
-            return RECORDING if drive_unknown(result) else OUTSIDE
+            return RECORDING if drive_blamed(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
@@ -165,6 +166,11 @@ def faulty(result: SearchResult) -> bool:
 def drive_unknown(result: SearchResult) -> bool:
     """Whether the drive that was recorded is not the one that the valve got."""
     return any(isinstance(f.hypothesis, DriveHypothesis) for f in result.faults)
+
+
+def drive_blamed(result: SearchResult) -> bool:
+    """Whether that is all there is to say: beside what is far off, a drive that is not known so well is a detail."""
+    return drive_unknown(result) and result.base.misfit.usual < MUCH
 
 
 def strained(result: SearchResult) -> bool:
