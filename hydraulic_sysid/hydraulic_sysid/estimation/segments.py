@@ -210,7 +210,7 @@ class Segments:
             if name in _STATES:
                 states[:, column] = np.where(np.isfinite(begin[:, column]), begin[:, column], 0.0)
             elif name == "stick":
-                slid = self._slid(plant.value("bristle_length"))
+                slid = self._slid(plant)
                 partly = np.clip(begin[:, _STATES.index("velocity")] / STICK_SPEED, -1.0, 1.0)
                 states[:, column] = np.where(slid != 0.0, slid, partly)
             elif plant.layout.state_records[name].initial == "command":
@@ -234,13 +234,17 @@ class Segments:
         It is read from what follows, as before that the piston may have braked; 0 where it stays at rest. One that
         creeps has its dry friction in full.
         """
-        return np.where(self._slid(plant.value("bristle_length")) != 0.0, np.nan, self._turning)
+        return np.where(self._slid(plant) != 0.0, np.nan, self._turning)
 
-    def _slid(self, length: float) -> Array:
-        """(S,) the direction in which the piston slides on by bristles of this ``length`` [m], or 0.
+    def _slid(self, plant: Plant) -> Array:
+        """(S,) the direction in which the piston slides on by its bristles' length, or 0.
 
-        It must do so before a segment and go on with it: one that comes to rest bends them back.
+        It must do so before a segment and go on with it: one that comes to rest bends them back. Without hydraulics the
+        drive is the force, and what the acceleration asks for is known well enough.
         """
+        if plant.model.kind != "hydraulic":
+            return np.zeros(len(self))
+        length = plant.value("bristle_length")
         position, channel = self.smoothed[:, _STATES.index("position")], self.channels.index("position")
         half = max(1, round(0.5 * _SLIDING / self.record.dt))
         before, after = np.maximum(self.first - half, 0), np.minimum(self.first + half, len(position) - 1)

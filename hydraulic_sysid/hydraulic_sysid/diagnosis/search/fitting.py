@@ -166,20 +166,6 @@ class Fitting:
             return False
         return not before.misfit.little or agreed(before.residual, after.residual, self.split.fit)
 
-    def begun_without_corners(self, model: Model) -> Model:
-        """The model, fitted as it is where its laws have a corner.
-
-        Far from the truth what only smooths a corner is bent first, often down to its bound, and from there a segment
-        that begins at rest may ring for good.
-        """
-        smooth = self._smooth(model)
-        keys = [key for key in smooth.movable_keys() if not smooth.parameter(key).nuisance]
-        done = fit_segments(
-            Plant.for_fits(smooth), self.split.some(ENOUGH), keys, self._first,
-            progress=lambda *_: self.say.left(), priors=self.priors,
-        )  # fmt: skip
-        return model.with_values(done.values)
-
     def nearer(self, model: Model, far: bool) -> SearchState:
         """A model fitted: where it is ``far`` off, to the end only if it comes near.
 

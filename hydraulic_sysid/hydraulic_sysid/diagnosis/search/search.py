@@ -60,7 +60,7 @@ class Search(RecordingFits):
     def begin(self) -> SearchState:
         """The model, fitted and judged by the noise that it leaves; the data sheet is relaxed where that helps."""
         self.say("fitting the model")
-        strict = self.judged(self.state(self.begun_without_corners(self.given), self._first))
+        strict = self.judged(self.state(self.given, self._first))
         self.path = [strict]
         self.say.reached((), strict.misfit)
         return self.loosened(strict)
