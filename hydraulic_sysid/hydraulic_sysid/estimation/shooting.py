@@ -79,6 +79,11 @@ class Shooting:
         """As the records show them."""
         return [s.initial_states(self.plant) for s in self.segments]
 
+    @cached_property
+    def _turning(self) -> list[Array]:
+        """The acceleration (S,) that dry friction is to give where segments begin at rest, per record."""
+        return [s.turning(self.plant) for s in self.segments]
+
     def nearer(self, plant: Plant, other: Sequence[Array]) -> list[Array]:
         """Of `initial_states` and another set of them those that leave less beyond the nuisance, in each segment."""
         own, new = (self._left(self.residuals(plant, states)) for states in (self.initial_states, other))
@@ -200,9 +205,8 @@ class Shooting:
         segments = self.segments[i]
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.drive if drive is None else drive
-        turning = segments.turning(self.plant)
         run = self._beside(plant, i).predict(
-            drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, turning,
+            drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, self._turning[i],
             segments.shown if plant.begins_shown else None,
         )  # fmt: skip
         return np.stack([run[c] for c in segments.channels], axis=-1)

@@ -37,6 +37,7 @@ class RecordingFits(DataSheetFits):
         self.faults: list[RecordingFault] = []
         self.rivals: list[RecordingFault] = []
         """Other faults, that explain about as much as the best candidate."""
+        self._first_effect: tuple[SearchState | None, SearchState | None] = (None, None)
         self.as_recorded: SearchState | None = None
         """Before any fault was assumed."""
 
@@ -73,8 +74,9 @@ class RecordingFits(DataSheetFits):
             if leaves_most(base.misfit, found.misfit) or base.misfit.fit - found.misfit.fit < least:
                 break
             # A quick refit falls short of what an effect explains; the fault has been fitted to the end.
-            effect = self.finish(base, partial(enough_at_first, base))
+            effect = self.first_effect(base)
             if effect is not None and effect.misfit.total < found.misfit.total:
+                self._first_effect = base, effect
                 break
             # Filters of sound transducers delay by a part of a sampling interval, too: that is known, but not named.
             if not base.misfit.little or found.fault.unusual(self.split.interval):
@@ -83,6 +85,14 @@ class RecordingFits(DataSheetFits):
             self.split, self.path = found.split, [found.state]
             base = self.loosened(self.judged(found.state))
         return base if base.scores else self.rounded(base)
+
+    def first_effect(self, base: SearchState) -> SearchState | None:
+        """A state with the effect that explains most of what it leaves, fitted to the end; None where none is worth it.
+
+        Where a fault was set against it, it is known.
+        """
+        (known, effect), self._first_effect = self._first_effect, (None, None)
+        return effect if known is base else self.finish(base, partial(enough_at_first, base))
 
     def bends(self, fault: RecordingFault, base: SearchState) -> bool:
         """Whether a fault is why a model leaves nothing only with small delays of all channels, or at bounds."""

@@ -39,7 +39,6 @@ from .worth import (
     PROMISES,
     anything,
     decisive,
-    enough_at_first,
     near_competitors,
     superfluous,
     without_competitor,
@@ -137,9 +136,10 @@ class Search(RecordingFits):
             added = [e for e in known.model.effects if e not in base.model.effects]
             path.append(self.explore(known, most=LATER_REFITS) if known.misfit.variance - 1.0 > NOTHING_LEFT else known)
         while len(added) < MOST_EFFECTS:
-            better = self.finish(
-                path[-1], partial(worth_adding, base, path[-1], added) if added else partial(enough_at_first, base)
-            )
+            if added:
+                better = self.finish(path[-1], partial(worth_adding, base, path[-1], added))
+            else:
+                better = self.first_effect(base)
             if better is not None and not added:
                 # The fit with an effect may have gone on where that without it had stopped.
                 without = better.model.without_effect(new_effect(better, base))
