@@ -2,7 +2,8 @@
 
 The library's defaults are those of one bench. On another plant forces are as much larger or smaller as its full force
 is, dry friction as its seals are round, lengths as its stroke, flows as that of its open valve: 450 N of dry friction
-mean nothing to a servo of 1 N·m, and the leakage of a large valve drowns a cylinder of 5 cm³.
+mean nothing to a servo of 1 N·m, and the leakage of a large valve drowns a cylinder of 5 cm³. What swings with the load
+does so as much faster or slower as the oil does.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ BENCH = {
     "flow": 2.5e-3 * math.sqrt(13.7e6 / 3.5e6),  # m³/s, of the open valve
     "speed": 2.5e-3 * math.sqrt(13.7e6 / 3.5e6) / 8.0645e-3,  # m/s, by it
     "compliance": 6.45e-3 / 1.5168e9,  # m³/Pa, of the oil on one side
+    "swing": 247.34,  # rad/s, natural frequency on the oil at mid stroke
 }  # … and of a hydraulic one
 UNITS: dict[str, Mapping[str, float]] = {
     "N": {"friction": 1},
@@ -43,29 +45,35 @@ UNITS: dict[str, Mapping[str, float]] = {
     "m^3/Pa": {"compliance": 1},
 }
 """What a parameter of a unit grows with. Times and shares are those of devices, whatever these move."""
+OF_LOADS: dict[str, Mapping[str, float]] = {"Hz": {"swing": 1}}
+"""The same of effects that act with a force on the piston."""
 
 
-def typical(model: Model, parameter: Parameter) -> float:
+def typical(model: Model, parameter: Parameter, slot: str = "") -> float:
     """The library's default of a parameter [SI], in the size of the model's plant.
 
     One that is counted from another value than 0, as a bristle's length from the stiffest, is left as it is.
+
+    :param slot: of the effect that has the parameter
     """
     if parameter.null:
         return parameter.default
-    ratio, (low, high) = _ratio(model, parameter.unit), parameter.bounds
+    ratio, (low, high) = _ratio(model, parameter.unit, slot), parameter.bounds
     return min(max(ratio * parameter.default, low), high)
 
 
 def sized(model: Model, effect: Effect) -> Effect:
     """The effect with defaults in the size of the model's plant."""
-    return replace(effect, parameters=tuple(replace(p, default=typical(model, p)) for p in effect.parameters))
+    defaults = [typical(model, p, effect.slot) for p in effect.parameters]
+    parameters = zip(effect.parameters, defaults, strict=True)
+    return replace(effect, parameters=tuple(replace(p, default=default) for p, default in parameters))
 
 
-def _ratio(model: Model, unit: str) -> float:
+def _ratio(model: Model, unit: str, slot: str) -> float:
     """How much larger what has this unit is on the model's plant than on the bench of the defaults."""
     of, usual = _PLANTS[model.kind]
-    found = of(model)
-    shares = [(found[q] / usual[q], power) for q, power in UNITS.get(unit, {}).items() if q in found]
+    found, made_of = of(model), UNITS | (OF_LOADS if slot == "force" else {})
+    shares = [(found[q] / usual[q], power) for q, power in made_of.get(unit, {}).items() if q in found]
     return math.prod(share**power for share, power in shares if 0.0 < share < math.inf)
 
 
@@ -90,6 +98,7 @@ def _hydraulic(model: Model) -> dict[str, float]:
         "flow": flow,
         "speed": flow / area,
         "compliance": volume / value("bulk_modulus"),
+        "swing": area * math.sqrt(2.0 * value("bulk_modulus") / (volume * value("moving_mass"))),
     }
 
 

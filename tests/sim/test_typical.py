@@ -7,7 +7,7 @@ import pytest
 from hydraulic_sim.effect import Parameter
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
-from hydraulic_sim.typical import UNITS, sized, typical
+from hydraulic_sim.typical import OF_LOADS, UNITS, sized, typical
 
 
 @pytest.fixture(scope="module")
@@ -41,5 +41,14 @@ def test_what_devices_have_is_left_and_bounds_hold(bench: Model) -> None:
         for before, after in zip(effect.parameters, sized(tiny, effect).parameters, strict=True):
             low, high = before.bounds
             assert low <= after.default <= high
-            if before.null or before.unit not in UNITS:
+            swings = effect.slot == "force" and before.unit in OF_LOADS
+            if before.null or before.unit not in UNITS and not swings:
                 assert after.default == before.default
+
+
+def test_what_swings_with_the_load_is_as_fast_as_the_oil(bench: Model) -> None:
+    heavier = bench.with_values({"moving_mass": 9.0 * bench.value("moving_mass")})
+    structure, spool = (sized(heavier, bench.library[name]) for name in ("structural_flexibility", "spool_dynamics"))
+    (swing,), (device,) = ([p.default for p in e.parameters if p.unit == "Hz"] for e in (structure, spool))
+    assert swing == pytest.approx(bench.library.parameter("structural_flexibility.frequency").default / 3.0, rel=1e-3)
+    assert device == bench.library.parameter("spool_dynamics.frequency").default

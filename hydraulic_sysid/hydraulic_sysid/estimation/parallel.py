@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -38,12 +38,28 @@ else:
 def results(function: Callable[[A], B], items: Iterable[A]) -> Iterator[B]:
     """What the function gives for each item, in their order, all processors at work.
 
-    What a worker asks for itself, it does alone: the others are busy.
+    What a worker asks for itself, it does itself, but for what others take off it that have nothing else to do.
     """
     given = list(items)
-    if getattr(_here, "works", False) or len(given) < 2:
+    if len(given) < 2:
         return map(function, given)
-    return _workers(processors.usable()).map(function, given)
+    workers = _workers(processors.usable())
+    if not getattr(_here, "works", False):
+        return workers.map(function, given)
+    return _shared(function, given, [workers.submit(function, one) for one in given])
+
+
+def _shared(function: Callable[[A], B], items: Sequence[A], futures: Sequence[Future[B]]) -> Iterator[B]:
+    """From the last on, as others take the first. It waits only for what another one works on, so none for ever."""
+    own: dict[int, B] = {}
+    try:
+        for i in reversed(range(len(items))):
+            if futures[i].cancel():
+                own[i] = function(items[i])
+    finally:
+        for future in futures:
+            future.cancel()
+    return (own[i] if i in own else future.result() for i, future in enumerate(futures))
 
 
 def _begin() -> None:

@@ -27,7 +27,9 @@ def scale(model: Model, key: str) -> float:
     """
     parameter = model.parameter(key)
     low, high = parameter.bounds
-    usual = 0.0 if parameter.required else abs(typical(model, parameter))
+    owner = key.rpartition(".")[0]
+    slot = model.library[owner].slot if owner else ""
+    usual = 0.0 if parameter.required else abs(typical(model, parameter, slot))
     return max(abs(model.value(key)), usual) or 0.01 * (high - low)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TypeVar
@@ -12,8 +13,8 @@ from hydraulic_sysid.estimation.parallel import results
 
 from .candidate_table import candidate_table
 from .candidates import candidates, delays, observed, subsystem
-from .fitting import ENOUGH, Fitting, Task, with_fitted_values, without_derivative
-from .frozen_jacobian import refit, refit_rounded
+from .fitting import ENOUGH, FAR_OFF, Fitting, Task, with_fitted_values, without_derivative
+from .frozen_jacobian import Refit, refit, refit_rounded
 from .linearisation import Linearisation
 from .misfit import misfit
 from .score_test import CandidateScore, score
@@ -142,7 +143,7 @@ class CandidateFits(Fitting):
             return None
         top = base.misfit.total - worth[0].misfit.total
         near = [r for r in worth if base.misfit.total - r.misfit.total >= NEAR * top]
-        near = [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][:FULL]
+        near = [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][: FULL + OTHERS]
         found = []
         for tried in self.set_against_others(base, near):
             self.say(f"fitting with {tried.name}")
@@ -150,28 +151,32 @@ class CandidateFits(Fitting):
                 state = self.begun_anew(self.state(tried.refit.model, self._last))
             except SimulationError:
                 continue
+            # What it is set against in the end is what it leaves at its best.
+            base.refits[:] = [_at_best(r, state) if r.name == tried.name else r for r in base.refits]
             if self.better(base, state) and enough(tried.name, state.misfit, 1.0):
                 found.append(state)
-        return min(found, key=lambda s: s.misfit.total, default=None)
+        return min(found, key=_with_freedom, default=None)
 
     def set_against_others(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
         """The refits to finish: the nearest, or what explains more once all parameters are free.
 
         A model whose data sheet is bent to its bounds imitates what it lacks, and from there a frozen Jacobian does not
         lead back; nor does it lead to the end where even the nearest leaves a good part. Others, no more than a few of
-        one subsystem, are then fitted to a few segments, too, before one is chosen.
+        one subsystem, are then set against them, and where the model is far off, those that promise most beside the
+        values of its file. They, and more that are near than can be finished, are fitted to a few segments first.
         """
         bent = any("." not in key and key in self.priors for key in base.linearisation.parameters.at_bound)
-        if not bent and near[0].misfit.excess <= (1.0 - NEAR) * base.misfit.excess:
-            return list(near)
-        names = {r.name for r in near}
-        every = [*near, *(r for r in base.refits if r.name not in names)]
-        every = varied(every, [base.model.library[r.name] for r in every], ALIKE)
-        others = [r for r in every if r.name not in names][:OTHERS]
-        if not others:
-            return list(near)
+        every = list(near)
+        if bent or near[0].misfit.excess > (1.0 - NEAR) * base.misfit.excess:
+            names = {r.name for r in near}
+            others = [*near, *(r for r in base.refits if r.name not in names)]
+            others = varied(others, [base.model.library[r.name] for r in others], ALIKE)
+            every += [r for r in others if r.name not in names][:OTHERS]
+            every += self.beside_filed_values(base) if base.misfit.variance >= FAR_OFF else []
+        if len(every) <= FULL and len(every) == len(near):
+            return every
         found = []
-        for r in [*near, *others]:
+        for r in every:
             self.say(f"setting {r.name} against others")
             try:
                 done = self.fitted_to(self.split.some(ENOUGH), r.refit.model, self._few)
@@ -179,8 +184,33 @@ class CandidateFits(Fitting):
                 continue
             fitted = replace(r.refit, model=r.refit.model.with_values(done.values))
             found.append((done.point.cost, replace(r, refit=fitted)))
-        found.sort(key=lambda pair: pair[0])
-        return [r for cost, r in found[:FULL] if cost <= FAR * found[0][0]] or list(near)
+        best: dict[str, tuple[float, CandidateRefit]] = {}
+        for cost, r in sorted(found, key=lambda pair: pair[0]):
+            best.setdefault(r.name, (cost, r))
+        ranked = list(best.values())[:FULL]
+        return [r for cost, r in ranked if cost <= FAR * ranked[0][0]] or every[:FULL]
+
+    def beside_filed_values(self, base: SearchState) -> list[CandidateRefit]:
+        """The best candidates on the model as its file has it, not refitted yet."""
+        filed = self.with_filed_values(base.model)
+        at = Linearisation.of(self._smooth(filed), self.split, self.priors, None)
+        scores = [s for s in score(at, candidates(filed), record_features(at)) if not observed(s.effect)]
+        best = varied(scores, [s.effect for s in scores], ALIKE)[:OTHERS]
+        models = [filed.with_effect(s.effect.name).with_values(s.start) for s in best]
+        return [CandidateRefit(s.effect.name, Refit(m, []), base.misfit) for s, m in zip(best, models, strict=True)]
+
+
+def _at_best(tried: CandidateRefit, state: SearchState) -> CandidateRefit:
+    """A refit, or where a fit to the end has left less, what that left."""
+    if tried.misfit.total <= state.misfit.total:
+        return tried
+    return replace(tried, refit=replace(tried.refit, model=state.model), misfit=state.misfit)
+
+
+def _with_freedom(state: SearchState) -> float:
+    """What a state leaves and what its free parameters are worth (BIC): of two that leave the same the simpler."""
+    left = state.misfit
+    return left.total + len(state.linearisation.parameters) * math.log(max(left.count, 1)) * left.variance
 
 
 def varied(found: Sequence[T], effects: Sequence[Effect], most: int) -> list[T]:

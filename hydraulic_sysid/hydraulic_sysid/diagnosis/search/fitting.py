@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
@@ -37,7 +38,7 @@ ENOUGH = 60  # segments, spread over all records, that do for a first fit
 FEW_STEPS = 6  # of a fit to those that only sets effects against each other, at most, …
 FEW_GAIN = 2e-3  # … and while a step lowers the sum of squares by this share
 LOOK = 20  # segments, spread over all records, that show where a fit from other values leads, …
-SAME_LOOK = 0.02  # … where it does not leave them less by this share: nowhere else
+SAME_LOOK = 0.02  # … where what noise does not explain falls by no more than this share: nowhere else
 SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
 BEYOND = 8  # values of a number that lay at its bound, over all where it may go, from which a fit may begin
@@ -227,8 +228,14 @@ class Fitting:
         return model.with_values(done.values)
 
     def leads_elsewhere(self, model: Model, state: SearchState) -> bool:
-        """Whether a fit that begins with this model's values leaves a few segments clearly less than a state does."""
-        return self.looked_at(model) < (1.0 - SAME_LOOK) * self.left_on_few(state)
+        """Whether a fit that begins with this model's values leaves a few segments clearly less than a state does.
+
+        That is less by a share of what noise does not explain, and by more than a fit to these segments alone gains.
+        """
+        before = self.left_on_few(state)
+        values = sum(int(s.counted.sum()) for s in self.split.some(LOOK))
+        needed = SIGNIFICANT * max(1.0, before / values) + SAME_LOOK * max(before - values, 0.0)
+        return before - self.looked_at(model) > needed
 
     def looked_at(self, model: Model) -> float:
         """What a fit to a few segments leaves of them."""
@@ -269,6 +276,15 @@ def quieter(before: Split, after: Split) -> bool:
         n < QUIETER * o
         for new, old in zip(after.segments, before.segments, strict=True)
         for n, o in zip(loud(new), loud(old), strict=True)
+    )
+
+
+def spiked(before: Split, after: Split, residual: Sequence[Array]) -> float:
+    """What samples that have turned out to be spikes had left of a ``residual`` (S, m) per record: sum of squares."""
+    return sum(
+        float(np.sum(old.by_channel(left)[new.outliers & ~old.outliers] ** 2))
+        for new, old, left in zip(after.segments, before.segments, residual, strict=True)
+        if len(new) == len(old)
     )
 
 

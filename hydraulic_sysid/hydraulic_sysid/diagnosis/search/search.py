@@ -25,7 +25,7 @@ from .candidate_fits import LATER_REFITS
 from .data_sheet_fits import new_effect
 from .drift import drift
 from .errors import DiagnosisError
-from .fitting import FAR_OFF, Task, quieter, retimed
+from .fitting import FAR_OFF, Task, quieter, retimed, spiked
 from .misfit import Misfit, explained, material
 from .progress import OutOfTimeError
 from .recording_fits import RecordingFits
@@ -111,10 +111,11 @@ class Search(RecordingFits):
         return found if again is None else self.onward(found.base, found.base.model, again)
 
     def judged_anew(self, state: SearchState) -> SearchState | None:
-        """A state judged by the noise and the delays that it shows; None where they are those it was judged by."""
+        """A state judged by the noise, spikes and delays that it shows; None where they are those it was judged by."""
         before, self._judged_with = self.split, set(state.model.effects)
         again = self.judged(state)
-        if not quieter(before, self.split) and not retimed(before, self.split):
+        spikes = spiked(before, self.split, state.residual) > state.misfit.least
+        if not (spikes or quieter(before, self.split) or retimed(before, self.split)):
             self.split = before
             return None
         self.say("searching on: what was taken for noise or small delays was partly what is missing")

@@ -12,6 +12,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.records.paired import partner_of
+from hydraulic_sysid.estimation.noise_model import SPIKY
 from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import candidates, subsystem
@@ -36,7 +37,6 @@ UNDECIDED = "undecided"
 DECIDED = (MISSING, COMPLETE, DATA_SHEET, RECORDING)
 """Verdicts that say which model explains the records."""
 
-MANY_SPIKES = 1e-4  # of all samples: more are a fault of the recording
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
 VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave, …
@@ -160,7 +160,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
 def faulty(result: SearchResult) -> bool:
     """Whether the recording, not the physics, is at fault."""
     saturated = any(a.reason == SATURATED for a in result.split.set_aside)
-    return saturated or bool(result.faults) or any(s.share > MANY_SPIKES for s in result.spikes)
+    return saturated or bool(result.faults) or any(s.share > SPIKY for s in result.spikes)
 
 
 def drive_unknown(result: SearchResult) -> bool:
@@ -320,7 +320,7 @@ def _spikes(s: Spikes) -> str:
     what = f"{s.count} sample{'' if one else 's'} of {TITLES[s.channel]} ({100.0 * s.share:.2g} %)"
     where = f"{'' if one else 'the first '}at {time:.4g} s of {name}"
     out = "it is left out" if one else "they are left out"
-    if s.share > MANY_SPIKES:
+    if s.share > SPIKY:
         what += " is a spike" if one else " are spikes"
         return f"{what}, {where}; {out}: look for a loose contact or a bad converter."
     return f"{what} stand{'s' if one else ''} alone far off the noise, {where}; {out}."
