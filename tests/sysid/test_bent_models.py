@@ -12,13 +12,14 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
 from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, Deviation, priors
 from hydraulic_sysid.diagnosis.search.data_sheet_fits import DataSheetFits
-from hydraulic_sysid.diagnosis.search.fitting import retimed
+from hydraulic_sysid.diagnosis.search.fitting import FAR_OFF, retimed, spiked
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
-from hydraulic_sysid.diagnosis.search.misfit import Misfit
+from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
 from hydraulic_sysid.diagnosis.search.score_test import score
 from hydraulic_sysid.diagnosis.search.search_state import SearchResult, SearchState
 from hydraulic_sysid.estimation.fit import FitSettings
@@ -139,3 +140,30 @@ def test_an_effect_that_leaves_less_than_the_whole_data_sheet_is_the_verdict(mod
     assert OneWrongNumber(model, less=400.0).named == (["friction_asymmetry"], [])
     assert OneWrongNumber(model, less=40.0).named == ([], ["piston_area_b"])  # it may be either
     assert OneWrongNumber(model, less=400.0, agreed=False).named == ([], ["piston_area_b"])
+
+
+def test_what_a_bent_model_hides_shows_beside_the_values_of_its_file(model: Model) -> None:
+    """A load that swings on its bracket, imitated by a mass twice as large."""
+    swings = {"mass": 0.4 * model.value("moving_mass"), "frequency": 12.0, "damping": 0.05}
+    record = swept(model.with_effect("structural_flexibility", swings))
+    fits = CandidateFits.of(model, [record], [], FitSettings(), lambda text: None)
+    bent = model.with_values({"moving_mass": 2.0 * model.value("moving_mass")})
+    at = Linearisation.of(bent, fits.split)
+    base = SearchState(bent, at, misfit(fits.split, at.costs), at.residual)
+    assert base.misfit.variance > FAR_OFF
+    found = fits.beside_filed_values(base)
+    assert found[0].name == "structural_flexibility"
+    assert found[0].refit.model.value("moving_mass") == model.value("moving_mass")
+    names = [s.effect.name for s in fits.scores(base)]
+    assert names.index("structural_flexibility") > 0
+
+
+def test_samples_that_turn_out_to_be_spikes_are_worth_what_they_had_left(model: Model) -> None:
+    before = split([swept(model)], [], model, 0.5)
+    (segments,) = before.segments
+    outliers = segments.outliers.copy()
+    outliers[2, 7, 0] = True
+    after = replace(before, segments=[replace(segments, outliers=outliers)])
+    left = np.ones((len(segments), segments.samples * len(segments.channels) + len(segments.free)))
+    assert spiked(before, after, [3.0 * left]) == 9.0
+    assert spiked(before, before, [left]) == spiked(after, before, [left]) == 0.0
