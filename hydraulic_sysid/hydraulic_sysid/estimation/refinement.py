@@ -42,7 +42,7 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
     late = _delays(point, columns, channels) if told else {}
     noise: dict[str, ChannelNoise] = {}
     loud = [np.ones_like(s.loudness) for s in segments]
-    spikes = _spikes(point, left, channels)
+    spikes = _spikes(point, left, channels, noise_model.SPIKY if told else noise_model.VERY_SPIKY)
     near = _near(point, spikes)
     lines: dict[str, tuple[float, ...]] = {}
     for channel in channels:
@@ -107,8 +107,11 @@ def outlying(squares: Array, every: Array) -> Mask:
     return np.asarray(squares > OUTLYING * float(np.quantile(every, 0.9)))
 
 
-def _spikes(point: FitPoint, left: Sequence[Array], channels: Sequence[str]) -> list[Mask]:
-    """Samples (S, samples, C) that are outliers of what a point has ``left`` (S, samples, C) [SI]."""
+def _spikes(point: FitPoint, left: Sequence[Array], channels: Sequence[str], known: float) -> list[Mask]:
+    """Samples (S, samples, C) that are outliers of what a point has ``left`` (S, samples, C) [SI].
+
+    ``known``: share of a channel's samples from which it is known to have spikes.
+    """
     segments = point.shooting.segments
     runs = point.shooting.simulated(point.plant, point.initial_states)
     deviations = [np.abs(s.measured - s.recorded(run)) for s, run in zip(segments, runs, strict=True)]
@@ -116,7 +119,7 @@ def _spikes(point: FitPoint, left: Sequence[Array], channels: Sequence[str]) -> 
     for channel in channels:
         where = [(i, s.channels.index(channel)) for i, s in enumerate(segments) if channel in s.channels]
         first = noise_model.estimate([left[i][:, :, c] for i, c in where], segments[where[0][0]].record.dt)
-        spiky = np.mean(np.concatenate([found[i][:, :, c].ravel() for i, c in where])) > noise_model.SPIKY
+        spiky = np.mean(np.concatenate([found[i][:, :, c].ravel() for i, c in where])) > known
         for i, c in where:
             found[i][:, :, c] &= deviations[i][:, :, c] > noise_model.OUTLIER * first.std
             found[i][:, :, c] |= noise_model.outliers(left[i][:, :, c], first)
