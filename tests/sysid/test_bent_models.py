@@ -22,6 +22,7 @@ from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
 from hydraulic_sysid.diagnosis.search.score_test import score
 from hydraulic_sysid.diagnosis.search.search_state import SearchResult, SearchState
+from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
@@ -167,3 +168,14 @@ def test_samples_that_turn_out_to_be_spikes_are_worth_what_they_had_left(model: 
     left = np.ones((len(segments), segments.samples * len(segments.channels) + len(segments.free)))
     assert spiked(before, after, [3.0 * left]) == 9.0
     assert spiked(before, before, [left]) == spiked(after, before, [left]) == 0.0
+
+
+def test_numbers_that_were_held_count_in_the_errors_of_the_others(model: Model) -> None:
+    """What transducers read too much, supply and tank may have more; no more than these may be off."""
+    pressures, offset = {"supply_pressure": 2e5, "tank_pressure": 2e5}, model.with_effect("pressure_offset")
+    at = Linearisation.of(offset, split([swept(model)], [], offset, 0.5))
+    held, plain = parameter_errors(at, pressures), parameter_errors(at)
+    assert all(held[key].standard_error >= own.standard_error for key, own in plain.items())
+    for key in ("pressure_offset.offset_a", "pressure_offset.offset_b"):
+        assert 1.5 * plain[key].standard_error < held[key].standard_error < plain[key].standard_error + 4e5
+    assert parameter_errors(at, {"valve_flow": 1.0}) == plain  # it was fitted

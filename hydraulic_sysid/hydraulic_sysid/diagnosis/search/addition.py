@@ -10,7 +10,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitSettings
 
-from .data_sheet import as_filed
+from .data_sheet import as_filed, tolerances
 from .diagnosis import finished
 from .document import added_document
 from .errors import DiagnosisError
@@ -49,5 +49,5 @@ def add(
     say = progress or (lambda _: None)
     found = Search.of(model, records, validation, settings or FitSettings(), say, watch=watch).add(effect)
     confirmed = material(found.base.misfit, found.final.misfit)
-    known = parameter_errors(found.final.linearisation)
+    known = parameter_errors(found.final.linearisation, tolerances(found.model))
     return Addition(as_filed(finished(found, known), model), confirmed, added_document(found, known, confirmed))

@@ -193,7 +193,10 @@ class CandidateFits(Fitting):
     def beside_filed_values(self, base: SearchState) -> list[CandidateRefit]:
         """The best candidates on the model as its file has it, not refitted yet."""
         filed = self.with_filed_values(base.model)
-        at = Linearisation.of(self._smooth(filed), self.split, self.priors, None)
+        try:
+            at = Linearisation.of(self._smooth(filed), self.split, self.priors)
+        except SimulationError:  # what was added beside it does not run with them
+            return []
         scores = [s for s in score(at, candidates(filed), record_features(at)) if not observed(s.effect)]
         best = varied(scores, [s.effect for s in scores], ALIKE)[:OTHERS]
         models = [filed.with_effect(s.effect.name).with_values(s.start) for s in best]

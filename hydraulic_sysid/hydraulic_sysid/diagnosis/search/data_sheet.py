@@ -107,6 +107,11 @@ def priors(given: Model) -> Priors:
     return found
 
 
+def tolerances(given: Model) -> dict[str, float]:
+    """By how much numbers of the data sheet may be off: standard deviations [SI, by key]."""
+    return {key: std for key, (_, std) in priors(given).items() if "." not in key}
+
+
 def restored(model: Model, given: Model, moved: Sequence[str]) -> Model:
     """A fitted model with the data sheet as it was ``given``, but for the numbers that have ``moved``."""
     loose = relaxed(given)

@@ -18,7 +18,7 @@ from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locat
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
-from .data_sheet import as_filed
+from .data_sheet import as_filed, tolerances
 from .document import document, with_balances
 from .holdout import MOST_VALUES
 from .linearisation import Linearisation
@@ -116,7 +116,7 @@ def diagnose(
             curves = curves if outside else []
         beside = () if suspect is found.base else tuple(found.added)
         remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
-        known = parameter_errors(found.final.linearisation)
+        known = parameter_errors(found.final.linearisation, tolerances(found.model))
         whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
         done = as_filed(finished(found, known), model)
         competing = {name: as_filed(other, model) for name, other in verdicts.alternatives(found, verdict).items()}

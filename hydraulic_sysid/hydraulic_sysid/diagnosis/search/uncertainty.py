@@ -5,19 +5,25 @@ error of the two counts. What a record says of a parameter depends on its experi
 quite the true one; the scatter between records then holds that too. What all records share of that they cannot show: no
 law of a library is that of a bench to the last per cent, and an interval is never narrower (a model discrepancy in the
 sense of Kennedy & O'Hagan, J. R. Statist. Soc. B 63 (2001), as a fixed share). The laws of effects are the rougher
-ones; the search takes them to be right to a twentieth, too (`search.LAW`).
+ones; the search takes them to be right to a twentieth, too (`search.LAW`). Numbers of the data sheet that a fit holds
+are not exact either: what they may be off within their tolerance moves the parameters, and is in the errors (their
+covariance with all of them free under their priors, less that of the fit).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
+from scipy.stats import norm
 from scipy.stats import t as student
 
-from hydraulic_sim.arrays import Array
+from hydraulic_sim.arrays import Array, Index
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.covariance import inverse, sandwich
 
 from .linearisation import Linearisation
@@ -26,6 +32,9 @@ _LAW = 0.01  # of a parameter's value: standard error for the law that it stands
 _EFFECT = 0.025  # … and of an effect
 _COVERED = 0.95
 _FEWEST = 3  # records whose scatter says something
+_STEP = 0.25  # of a tolerance: how far a held number is moved to see what it changes
+EXACT: Mapping[str, float] = MappingProxyType({})
+"""Tolerances of a data sheet that is taken for the truth."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +46,19 @@ class Known:
     at_bound: str | None
 
 
-def parameter_errors(at: Linearisation) -> dict[str, Known]:
-    """By key, of all parameters that were fitted. One at a bound counts as fixed there."""
+def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT) -> dict[str, Known]:
+    """By key, of all parameters that were fitted. One at a bound counts as fixed there.
+
+    ``tolerances``: by how much numbers may be off that were not fitted (standard deviation) [SI, by key].
+    """
     parameters, at_bound = at.parameters, at.parameters.at_bound
     free = np.flatnonzero([k not in at_bound for k in parameters.keys])
     errors, widths = np.full((2, len(parameters)), np.inf)
     if free.size:
-        errors[free], widths[free] = _errors(inverse(at.normal.subset(free).information), at.normal.subset(free).scores)
+        own, half = _errors(inverse(at.normal.subset(free).information), at.normal.subset(free).scores)
+        sheet = _of_held(at, free, tolerances)
+        errors[free] = np.hypot(own, sheet)
+        widths[free] = np.hypot(half, norm.ppf(0.5 + 0.5 * _COVERED) * sheet)
     found = {}
     for key, error, width, value, scale in zip(
         parameters.keys, errors.tolist(), widths.tolist(), parameters.values.tolist(), parameters.scales, strict=True
@@ -56,6 +71,24 @@ def parameter_errors(at: Linearisation) -> dict[str, Known]:
             at_bound.get(key),
         )
     return found
+
+
+def _of_held(at: Linearisation, free: Index, tolerances: Mapping[str, float]) -> Array:
+    """Standard errors (F,) of these parameters, of their scales, from the numbers that were held."""
+    held = {k: s for k, s in tolerances.items() if k not in at.parameters.keys}
+    if not held:
+        return np.zeros(free.size)
+    model, fitted = at.model, len(at.parameters)
+    moved = [model.with_values({k: model.value(k) + _STEP * s}) for k, s in held.items()]
+    try:
+        columns = [c / _STEP for c in at.changes([Plant.for_fits(m) for m in moved])]
+    except SimulationError:  # it does not run with one of them
+        return np.zeros(free.size)
+    information = at.bordered(columns).information
+    information[fitted:, fitted:] += np.eye(len(held))
+    every = np.concatenate((free, fitted + np.arange(len(held))))
+    both, alone = (np.diag(inverse(information[np.ix_(part, part)]))[: free.size] for part in (every, free))
+    return np.sqrt(np.maximum(both - alone, 0.0))
 
 
 def _errors(bread: Array, scores: Sequence[Array]) -> tuple[Array, Array]:
