@@ -17,6 +17,7 @@ from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
 from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, Deviation, priors
 from hydraulic_sysid.diagnosis.search.data_sheet_fits import DataSheetFits
 from hydraulic_sysid.diagnosis.search.fitting import FAR_OFF, retimed, spiked
+from hydraulic_sysid.diagnosis.search.frozen_jacobian import refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
@@ -37,11 +38,11 @@ def model() -> Model:
     return load_model("sample_bench")
 
 
-def swept(model: Model) -> Record:
-    """The bench under a sweep, with noise of 2 µm and 1 kPa."""
+def swept(model: Model, height: float = 3.0) -> Record:
+    """The bench under a sweep of so many volts, with noise of 2 µm and 1 kPa."""
     rng = np.random.default_rng(5)
     t = DT * np.arange(round(SECONDS / DT))
-    drive = 3.0 * np.sin(2.0 * np.pi * (0.5 + 2.0 * t) * t)
+    drive = height * np.sin(2.0 * np.pi * (0.5 + 2.0 * t) * t)
     run = Plant(model).simulate(drive, DT)
     noise = {"position": 2e-6, "pressure_a": 1e3, "pressure_b": 1e3}
     channels = {c: np.asarray(getattr(run, c)) + rng.normal(0.0, s, t.size) for c, s in noise.items()}
@@ -53,6 +54,18 @@ def test_a_probe_that_goes_too_far_is_tried_nearer(model: Model) -> None:
     at = Linearisation.of(model, split([record], [], model, 0.5))
     (found,) = score(at, [model.library["hose_compliance"]], RecordFeatures())
     assert found.start["hose_compliance.capacity"] == pytest.approx(CAPACITY, rel=0.3)  # by usual sizes a tenth of it
+
+
+def test_a_limit_that_is_reached_far_from_where_it_is_looked_for_is_found(model: Model) -> None:
+    """Nearer to nothing than the limit itself it changes nothing, and no derivative leads to it."""
+    name, limit = "valve_flow_saturation", {"limit": 0.46}
+    record = swept(model.with_effect(name, limit), 5.5)
+    at = Linearisation.of(model, split([record], [], model, 0.5))
+    (found,) = score(at, [model.library[name]], RecordFeatures())
+    assert found.reduction > 0.1 * sum(float(c.sum()) for c in at.costs)
+    refits = [refit(at, model.with_effect(name), start) for start in (found.start, *found.others)]
+    best = min(refits, key=lambda r: sum(float(c.sum()) for c in r.costs))
+    assert best.model.value(f"{name}.limit") == pytest.approx(0.46, rel=0.02)
 
 
 def test_what_a_model_bends_to_explain_the_same_counts_against_it() -> None:

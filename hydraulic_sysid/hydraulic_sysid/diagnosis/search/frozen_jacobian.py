@@ -25,6 +25,7 @@ from .linearisation import Linearisation
 
 _ENDLESS = 1e100  # residual over noise of a run that has left all bounds
 _FLAT = 2e-4  # relative gain of a step that ends the refit
+_NOTHING = 1e-6  # relative change of the sum of squares: none
 _MOST_STEPS = 10
 _SHARES = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.05)  # of the predicted size, to start from
 _ROUNDS = 2  # times that initial states are moved at the end
@@ -67,14 +68,17 @@ def refit_rounded(at: Linearisation, model: Model) -> Refit:
 
 
 def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Sequence[str]) -> FrozenPoint | None:
-    """Where to start: as far towards the prediction as lowers the sum of squares."""
+    """Where to start: as far towards the prediction as lowers the sum of squares.
+
+    Where the effect changes nothing short of it, as a limit that is never reached, there: else no way leads to it.
+    """
     predicted = Parameters.of(model, own)
     values = np.array([start[k] for k in own])
     predicted = replace(predicted, values=np.clip(values, predicted.low, predicted.high))
     plant = Plant.for_fits(model.with_values({**start, **predicted.by_key}))
     records = [model.parameter(k) for k in own]
     before = sum(float(c[f].sum()) for c, f in zip(at.costs, at.split.fit, strict=True)) + at.parameters.prior_cost
-    found = None
+    found, whole = None, None
     for share in _SHARES:
         tried = [
             v if r.null is None else between(r.null, v, share, r.default)
@@ -82,9 +86,11 @@ def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Seq
         ]
         candidate = replace(predicted, values=np.array(tried))
         found = FrozenPoint.at(at, plant, at.parameters + candidate, at.point.initial_states)
-        if found is not None and found.cost < before:
-            break
-    return found
+        whole = whole or found
+        if found is not None and found.cost < (1.0 - _NOTHING) * before:
+            return found
+    nothing = found is not None and abs(found.cost - before) < _NOTHING * before
+    return whole if nothing else found
 
 
 @dataclass(frozen=True)
