@@ -25,7 +25,7 @@ BENCH = {
     "flow": 2.5e-3 * math.sqrt(13.7e6 / 3.5e6),  # m³/s, of the open valve
     "speed": 2.5e-3 * math.sqrt(13.7e6 / 3.5e6) / 8.0645e-3,  # m/s, by it
     "compliance": 6.45e-3 / 1.5168e9,  # m³/Pa, of the oil on one side
-    "swing": 247.34,  # rad/s, natural frequency on the oil at mid stroke
+    "swing": 8.0645e-3 * math.sqrt(2.0 * 1.5168e9 / (6.45e-3 * 500.0)),  # rad/s, of that mass on the oil at mid stroke
 }  # … and of a hydraulic one
 UNITS: dict[str, Mapping[str, float]] = {
     "N": {"friction": 1},

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import cast
+from types import SimpleNamespace
+from typing import ClassVar, cast
 
 import numpy as np
 import pytest
@@ -17,13 +19,14 @@ from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
 from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, Deviation, priors
 from hydraulic_sysid.diagnosis.search.data_sheet_fits import DataSheetFits
 from hydraulic_sysid.diagnosis.search.fitting import FAR_OFF, retimed, spiked
-from hydraulic_sysid.diagnosis.search.frozen_jacobian import refit
+from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit, refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
 from hydraulic_sysid.diagnosis.search.score_test import score
-from hydraulic_sysid.diagnosis.search.search_state import SearchResult, SearchState
+from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
 from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
+from hydraulic_sysid.diagnosis.search.worth import anything
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
@@ -192,3 +195,44 @@ def test_numbers_that_were_held_count_in_the_errors_of_the_others(model: Model) 
     for key in ("pressure_offset.offset_a", "pressure_offset.offset_b"):
         assert 1.5 * plain[key].standard_error < held[key].standard_error < plain[key].standard_error + 4e5
     assert parameter_errors(at, {"valve_flow": 1.0}) == plain  # it was fitted
+
+
+class TwoNear(CandidateFits):
+    """A search whose second candidate turns out to leave less, once it is fitted to the end."""
+
+    REFITTED: ClassVar = {"valve_deadband": 40_100.0, "valve_underlap": 40_200.0, "supply_droop": 45_000.0}
+    FINISHED: ClassVar = {"valve_deadband": 40_090.0, "valve_underlap": 40_010.0}
+
+    def __init__(self) -> None:
+        self.say, self._last = lambda text: None, FitSettings()
+
+    def set_against_others(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
+        return list(near)
+
+    def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
+        at = SimpleNamespace(parameters=[])
+        return SearchState(model, cast(Linearisation, at), left(self.FINISHED[model.effects[-1]]), [])
+
+    def begun_anew(self, state: SearchState) -> SearchState:
+        return state
+
+    def better(self, before: SearchState, after: SearchState) -> bool:
+        return True
+
+
+def left(squares: float) -> Misfit:
+    return Misfit(squares, 0.0, 40_000, 0)
+
+
+def test_candidates_are_compared_as_they_were_fitted_to_the_end(model: Model) -> None:
+    """The best first, as whoever reads them takes them to be."""
+    refits = [
+        CandidateRefit(name, Refit(model.with_effect(name), []), left(squares))
+        for name, squares in TwoNear.REFITTED.items()
+    ]
+    base = SearchState(model, cast(Linearisation, None), left(48_000.0), [], refits)
+    found = TwoNear().finish(base, anything)
+    assert found is not None and found.model.effects[-1] == "valve_underlap"
+    assert [(r.name, r.misfit.total) for r in base.refits] == [
+        ("valve_underlap", 40_010.0), ("valve_deadband", 40_090.0), ("supply_droop", 45_000.0),
+    ]  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TypeVar
@@ -152,7 +151,8 @@ class CandidateFits(Fitting):
             except SimulationError:
                 continue
             # What it is set against in the end is what it leaves at its best.
-            base.refits[:] = [_at_best(r, state) if r.name == tried.name else r for r in base.refits]
+            best = [_at_best(r, state) if r.name == tried.name else r for r in base.refits]
+            base.refits[:] = sorted(best, key=lambda r: r.misfit.total)
             if self.better(base, state) and enough(tried.name, state.misfit, 1.0):
                 found.append(state)
         return min(found, key=_with_freedom, default=None)
@@ -212,8 +212,7 @@ def _at_best(tried: CandidateRefit, state: SearchState) -> CandidateRefit:
 
 def _with_freedom(state: SearchState) -> float:
     """What a state leaves and what its free parameters are worth (BIC): of two that leave the same the simpler."""
-    left = state.misfit
-    return left.total + len(state.linearisation.parameters) * math.log(max(left.count, 1)) * left.variance
+    return state.misfit.total + len(state.linearisation.parameters) * state.misfit.freedom
 
 
 def varied(found: Sequence[T], effects: Sequence[Effect], most: int) -> list[T]:

@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 
-import numpy as np
-
 from hydraulic_sim.errors import SimulationError
 
 from .candidate_fits import FULL, LATER_REFITS, PROMISED, CandidateFits
@@ -93,7 +91,7 @@ class DataSheetFits(CandidateFits):
             return None
         without, states = self.in_place_of(strict, done, moved, moved)
         best = min(states, key=lambda s: s.misfit.total, default=done)
-        spared = (len(moved) - 1) * np.log(done.misfit.count) * done.misfit.variance
+        spared = (len(moved) - 1) * done.misfit.freedom
         if best is done or reduction(best.misfit, done.misfit) > spared or not self.better(strict, best):
             return None
         name = new_effect(best, strict)

@@ -99,6 +99,11 @@ class Misfit:
         """The smallest reduction of the sum of squares that counts."""
         return max(SIGNIFICANT, VISIBLE * self.count) * self.variance
 
+    @property
+    def freedom(self) -> float:
+        """What a free parameter is worth of the sum of squares (BIC)."""
+        return math.log(max(self.count, 2)) * self.variance
+
 
 def misfit(split: Split, costs: Sequence[Array], prior: float = 0.0) -> Misfit:
     """Of the sums of squares ``costs[i]`` (S_i,) and of the prior; each initial state takes its degrees of freedom."""

@@ -55,8 +55,10 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
     free = np.flatnonzero([k not in at_bound for k in parameters.keys])
     errors, widths = np.full((2, len(parameters)), np.inf)
     if free.size:
-        own, half = _errors(inverse(at.normal.subset(free).information), at.normal.subset(free).scores)
-        sheet = _of_held(at, free, tolerances)
+        normal = at.normal.subset(free)
+        bread = inverse(normal.information)
+        own, half = _errors(bread, normal.scores)
+        sheet = _of_held(at, free, bread, tolerances)
         errors[free] = np.hypot(own, sheet)
         widths[free] = np.hypot(half, norm.ppf(0.5 + 0.5 * _COVERED) * sheet)
     found = {}
@@ -73,8 +75,11 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
     return found
 
 
-def _of_held(at: Linearisation, free: Index, tolerances: Mapping[str, float]) -> Array:
-    """Standard errors (F,) of these parameters, of their scales, from the numbers that were held."""
+def _of_held(at: Linearisation, free: Index, bread: Array, tolerances: Mapping[str, float]) -> Array:
+    """Standard errors (F,) of these parameters, of their scales, from the numbers that were held.
+
+    ``bread`` (F, F): their covariance where nothing else may be off.
+    """
     held = {k: s for k, s in tolerances.items() if k not in at.parameters.keys}
     if not held:
         return np.zeros(free.size)
@@ -87,8 +92,8 @@ def _of_held(at: Linearisation, free: Index, tolerances: Mapping[str, float]) ->
     information = at.bordered(columns).information
     information[fitted:, fitted:] += np.eye(len(held))
     every = np.concatenate((free, fitted + np.arange(len(held))))
-    both, alone = (np.diag(inverse(information[np.ix_(part, part)]))[: free.size] for part in (every, free))
-    return np.sqrt(np.maximum(both - alone, 0.0))
+    both = inverse(information[np.ix_(every, every)])
+    return np.sqrt(np.maximum(np.diag(both)[: free.size] - np.diag(bread), 0.0))
 
 
 def _errors(bread: Array, scores: Sequence[Array]) -> tuple[Array, Array]:
