@@ -17,7 +17,7 @@ from .fitting import FAR_OFF, worse
 from .misfit import explained, reduction
 from .search_state import SearchResult, SearchState
 from .uncertainty import parameter_errors
-from .worth import FURTHER, PROMISES
+from .worth import FURTHER, PROMISES, nothing_gained
 
 WORSE_LOOK = 0.2  # share by which a look at few segments leaves them more: the fit leads to something worse
 SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one, …
@@ -67,8 +67,8 @@ class DataSheetFits(CandidateFits):
             best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
             # All numbers together may do what an effect does, too.
             nearest = min((done, final), key=lambda s: s.misfit.total)
-            clear = PROMISES * nearest.misfit.least
-            if nearest.misfit.total - best.misfit.total > clear and self.better(nearest, best):
+            clear = nearest.misfit.total - best.misfit.total > PROMISES * nearest.misfit.least
+            if clear and self.better(nearest, best) and not nothing_gained(nearest.misfit, best.misfit):
                 name = new_effect(best, strict)
                 return replace(
                     found, base=strict, final=best, misfits={name: best.misfit}, competing={name: places[place][0]},
