@@ -1,23 +1,21 @@
-"""Where a real virtual CAN interface of the kernel is to be had: here, or in a small virtual machine.
-
-The machine boots Debian's kernel under software emulation with this machine's files (read-only, but for one folder).
-"""
+"""Where a real virtual CAN interface of the kernel is to be had: here, or in a small virtual machine."""
 
 from __future__ import annotations
 
-import contextlib
 import os
 import platform
 import shlex
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from system import machine
+
 SYSTEM_PATHS = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+MODULES = "vcan", "can_raw", "can_bcm"
 REQUIRED = "BENCH_REQUIRE_VCAN"
 """Environment variable: set, a machine that can have no vcan fails these tests instead of skipping them."""
 
@@ -62,7 +60,7 @@ def lacking_machine() -> str:
     """Why no virtual machine can be started; empty if one can."""
     if platform.machine() != "x86_64":
         return f"the virtual machine is for x86_64, this is {platform.machine()}"
-    programs = ["vng", "qemu-system-x86_64", "busybox", "modprobe", "ip", "candump"]
+    programs = ["qemu-system-x86_64", "busybox", "modprobe", "ip", "candump"]
     missing = [name for name in programs if shutil.which(name, path=path()) is None]
     if missing:
         return f"missing: {', '.join(missing)} (.ci/run installs them as root)"
@@ -70,37 +68,26 @@ def lacking_machine() -> str:
 
 
 def in_machine(script: Path, channel: str, folder: Path, log: Path, patience: float) -> int:
-    """Run `script channel folder` in a virtual machine with that interface; exit code of the machine.
+    """Run `script channel folder` in a virtual machine with that interface; exit code of the emulator.
 
     :raises subprocess.TimeoutExpired: it has not ended within `patience` [s]; nothing of it is left then either.
     """
+    # Compiled here to byte code: the machine reads this one's files, and would take minutes over it.
+    imports = "import runpy, sys; runpy.run_path(sys.argv[1])"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    subprocess.run([sys.executable, "-c", imports, str(script)], env=environment, check=True)
     lines = [
-        f"export PATH={shlex.quote(path())} HOME=/tmp ROS_LOG_DIR=/tmp/ros",
+        f"export PATH={shlex.quote(path())} HOME=/run TMPDIR=/run ROS_LOG_DIR=/run/ros PYTHONDONTWRITEBYTECODE=1",
         "export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID=1 PYTHONUNBUFFERED=1 OPENBLAS_NUM_THREADS=1",
-        f"export PYTHONPATH={shlex.quote(os.pathsep.join(p for p in sys.path if p))}",
-        "modprobe vcan && modprobe can_raw && modprobe can_bcm || exit 3",
+        f"export PYTHONPATH={shlex.quote(environment['PYTHONPATH'])}",
+        f"cd {shlex.quote(str(folder))} || exit 3",
         f"ip link set lo up && ip link add dev {channel} type vcan && ip link set {channel} up || exit 4",
         f"exec {shlex.quote(sys.executable)} {shlex.quote(str(script))} {channel} {shlex.quote(str(folder))}",
     ]
     start = folder / "guest.sh"
     start.write_text("\n".join(lines) + "\n")
-    vng = shutil.which("vng", path=path())
-    assert vng is not None
-    command = [
-        vng, "--run", str(kernels()[-1]), "--force-9p", "--disable-kvm", "--user", "root", "--cpus", "2",
-        "--memory", "2G", "--rwdir", str(folder), "--cwd", str(folder), "--", f"bash {shlex.quote(str(start))}",
-    ]  # fmt: skip
-    with log.open("wb") as sink:
-        machine = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=sink, stderr=subprocess.STDOUT, start_new_session=True,
-            env={**os.environ, "PATH": path()},
-        )  # fmt: skip
-        try:
-            return machine.wait(patience)
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(machine.pid, signal.SIGKILL)
-            machine.wait()
+    return machine.run(kernels()[-1], MODULES, ["/bin/bash", str(start)], folder, log, patience, path())
 
 
 def in_process(script: Path, channel: str, folder: Path, log: Path, patience: float) -> int:

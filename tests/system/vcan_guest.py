@@ -164,7 +164,7 @@ def listened_to(channel: str) -> bool:
 def main() -> int:
     channel, folder = sys.argv[1], Path(sys.argv[2])
     begun = time.monotonic()
-    know_log_callers()  # half a minute here; forked, the others know it
+    know_log_callers()  # forked, the others know it
     with (folder / "candump.log").open("wb") as sink:
         # -L: log format, with the kernel's time of reception to the microsecond.
         witness = subprocess.Popen(["candump", "-L", channel], stdout=sink)
