@@ -89,7 +89,7 @@ NR = {n_rates}
 NX = {n_states}
 
 
-@njit("f8(f8, f8, f8, f8)", error_model="numpy")
+@njit("f8(f8, f8, f8, f8)", cache=True, error_model="numpy")
 def relax(start, rate, goal, span):
     if rate == 0.0:
         return start

@@ -5,17 +5,37 @@ from __future__ import annotations
 import math
 import re
 from functools import lru_cache
-
-import pint
+from typing import TYPE_CHECKING
 
 from .errors import ModelError
+
+if TYPE_CHECKING:
+    import pint  # otherwise only where it is needed: it takes as long to load as everything else of a node
 
 # A number in the notation of YAML and Python (no thousands separators, a point before decimals), then a unit or none.
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
+EVERYDAY = {
+    ("um", "m"): 1e-6,
+    ("mm", "m"): 1e-3,
+    ("cm", "m"): 1e-2,
+    ("in", "m"): 0.0254,
+    ("mm^2", "m^2"): 1e-6,
+    ("cm^2", "m^2"): 1e-4,
+    ("in^2", "m^2"): 0.00064516,
+    ("l/min", "m^3/s"): 1.666666666666667e-05,
+    ("bar", "Pa"): 1e5,
+    ("MPa", "Pa"): 1e6,
+    ("psi", "Pa"): 6894.7572931683635,
+    ("ms", "s"): 1e-3,
+}
+"""Factors of the units that model files are full of, which are so read without pint; they are pint's, bit by bit."""
+
 
 @lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry:
+    import pint
+
     registry: pint.UnitRegistry = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
     registry.define("percent_opening = 0.01 = percent_open")
     return registry
@@ -55,8 +75,12 @@ def _from_text(text: str, unit: str, where: str) -> float:
     if parts is None:
         raise ModelError(f"{where}: {text!r} is not a quantity; {example}")
     number, own = float(parts[1]), parts[2]
-    if not own:
+    if not own or own == unit:
         return number
+    if (own, unit) in EVERYDAY:
+        return number * EVERYDAY[own, unit]
+    import pint
+
     try:
         quantity = _registry().Quantity(number, own)
         if _angle(quantity) != _angle(_registry().Quantity(1.0, unit)):

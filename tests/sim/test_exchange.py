@@ -7,6 +7,7 @@ import subprocess
 import xml.etree.ElementTree as Xml
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -16,7 +17,6 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
 from hydraulic_sim import base
-from hydraulic_sim.effects import viscous_friction
 from hydraulic_sim.errors import EffectError, ExchangeError
 from hydraulic_sim.exchange.fmu import compiler, write_fmu
 from hydraulic_sim.exchange.foreign import ForeignFmu
@@ -216,13 +216,11 @@ def test_rate_too_slow_or_too_fast_is_told(tmp_path: Path) -> None:
         plant_source(model, 1e6)
 
 
-def test_effect_that_c_cannot_be_written_of_is_named(tmp_path: Path) -> None:
+def test_effect_that_c_cannot_be_written_of_is_named(tmp_path: Path, small_library: Model) -> None:
     file = tmp_path / "odd_friction.py"
-    text = Path(viscous_friction.__file__).read_text(encoding="utf-8")
-    text = text.replace("    return -viscosity", "    return -numpy.cbrt(viscosity)")
-    text = text.replace("from hydraulic_sim.effect", "import numpy\n\nfrom hydraulic_sim.effect")
-    file.write_text(text.replace("slot=", 'name="odd_friction", slot='))
-    model = load_model("sample_bench").with_effect_file(file).with_effect("odd_friction")
+    text = PIECE.replace("import math\n", "import math\n\nimport numpy\n")
+    file.write_text(text.replace("math.tanh(velocity)", "numpy.cbrt(velocity)"))
+    model = small_library.with_effect_file(file).with_effect("odd_friction")
     with pytest.raises(EffectError, match="odd_friction.*cannot be written in C"):
         plant_source(model, RATE)
 
@@ -350,27 +348,28 @@ def force(velocity, level):
 EFFECT = Effect(
     name="odd_friction", slot="force", summary="s", kernel=force,
     parameters=(Parameter("level", "N", 20.0, (0.0, 1e6), "d", "s", null=0.0),),
-    equation="e", source="s", excited_by="x", confused_with=("viscous_friction",), distinguished_by="y",
+    equation="e", source="s", excited_by="x", confused_with=("end_stop",), distinguished_by="y",
 )
 """
 
 
-def test_what_python_and_c_do_otherwise_is_done_as_in_python(tmp_path: Path) -> None:
+def test_what_python_and_c_do_otherwise_is_done_as_in_python(tmp_path: Path, small_library: Model) -> None:
     """A loop's bound and counter, remainders of negative numbers, division of whole ones, a flag that changes."""
     (tmp_path / "odd_friction.py").write_text(PIECE)
-    model = load_model("sample_bench").with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
+    bare = replace(small_library, document=None)  # which names effects of the full library
+    model = bare.with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
     write_fmu(model, tmp_path / "odd.fmu", RATE)
     drive = multisine(3.0)
     truth = Plant(model).simulate(drive, 1.0 / RATE)["position"]
-    without = Plant(load_model("sample_bench")).simulate(drive, 1.0 / RATE)["position"]
+    without = Plant(bare).simulate(drive, 1.0 / RATE)["position"]
     found = ForeignFmu(tmp_path / "odd.fmu").simulate(drive, 1.0 / RATE)["position"]
     assert np.abs(truth - without).max() > 1e-5
     assert np.abs(found - truth).max() <= 1e-9 * np.ptp(truth)
 
 
-def test_a_loop_with_an_else_is_refused(tmp_path: Path) -> None:
+def test_a_loop_with_an_else_is_refused(tmp_path: Path, small_library: Model) -> None:
     looped = "    while head > 9:\n        head -= 1\n    else:\n        head = 4\n    half = 3\n"
     (tmp_path / "odd_friction.py").write_text(PIECE.replace("    half = 3\n", looped))
-    model = load_model("sample_bench").with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
+    model = small_library.with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
     with pytest.raises(EffectError, match="While cannot be written in C"):
         plant_source(model, RATE)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 
+import pint
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,9 +16,10 @@ from hydraulic_sim import base
 from hydraulic_sim.errors import ModelError
 from hydraulic_sim.model_document import quantity
 from hydraulic_sim.registry import library
-from hydraulic_sim.units import conversion, to_si
+from hydraulic_sim.units import EVERYDAY, conversion, to_si
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
 PARAMETERS = [*base.PARAMETERS, *(p for e in library().values() for p in e.parameters)]
 
 
@@ -113,3 +118,20 @@ def test_an_unknown_unit_of_a_column_is_refused() -> None:
         conversion("furlongz", "m")
     with pytest.raises(ModelError, match="unit 'kg' does not convert to m"):
         conversion("kg", "m", "column x")
+
+
+@pytest.fixture(scope="module")
+def registry() -> pint.UnitRegistry:
+    return pint.UnitRegistry()
+
+
+@pytest.mark.parametrize(("own", "unit"), EVERYDAY)
+@given(number=st.floats(-1e9, 1e9))
+def test_what_is_converted_without_pint_is_what_pint_says(registry, own: str, unit: str, number: float) -> None:
+    assert to_si(f"{number!r} {own}", unit) == registry.Quantity(number, own).to(unit).magnitude
+
+
+def test_a_model_file_is_read_without_pint() -> None:
+    """It takes longer to load than all else that a node needs."""
+    code = "import sys, hydraulic_sim.model_file as file; [file.load_model(p) for p in file.presets()]"
+    subprocess.run([sys.executable, "-c", f"{code}; assert 'pint' not in sys.modules"], check=True, env=ENVIRONMENT)
