@@ -7,7 +7,6 @@ import subprocess
 import xml.etree.ElementTree as Xml
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -353,15 +352,14 @@ EFFECT = Effect(
 """
 
 
-def test_what_python_and_c_do_otherwise_is_done_as_in_python(tmp_path: Path, small_library: Model) -> None:
+def test_what_python_and_c_do_otherwise_is_done_as_in_python(tmp_path: Path) -> None:
     """A loop's bound and counter, remainders of negative numbers, division of whole ones, a flag that changes."""
     (tmp_path / "odd_friction.py").write_text(PIECE)
-    bare = replace(small_library, document=None)  # which names effects of the full library
-    model = bare.with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
+    model = load_model("sample_bench").with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
     write_fmu(model, tmp_path / "odd.fmu", RATE)
     drive = multisine(3.0)
     truth = Plant(model).simulate(drive, 1.0 / RATE)["position"]
-    without = Plant(bare).simulate(drive, 1.0 / RATE)["position"]
+    without = Plant(load_model("sample_bench")).simulate(drive, 1.0 / RATE)["position"]
     found = ForeignFmu(tmp_path / "odd.fmu").simulate(drive, 1.0 / RATE)["position"]
     assert np.abs(truth - without).max() > 1e-5
     assert np.abs(found - truth).max() <= 1e-9 * np.ptp(truth)
