@@ -86,19 +86,26 @@ class DataSheetFits(CandidateFits):
     def simpler(
         self, found: SearchResult, strict: SearchState, done: SearchState, moved: Sequence[Deviation]
     ) -> SearchResult | None:
-        """With the one effect that explains what takes several numbers of the data sheet, as BIC has it."""
+        """With the one effect that explains what takes several numbers of the data sheet, as BIC has it.
+
+        Of all of them, or of all but the one that is surest: a wrong area hides what a hose does, too.
+        """
         if len(moved) < 2 or not worse(strict.misfit, done.misfit):
             return None
-        without, states = self.in_place_of(strict, done, moved, moved)
-        best = min(states, key=lambda s: s.misfit.total, default=done)
-        spared = (len(moved) - 1) * done.misfit.freedom
-        if best is done or reduction(best.misfit, done.misfit) > spared or not self.better(strict, best):
-            return None
-        name = new_effect(best, strict)
-        return replace(
-            found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without},
-            numbers_instead=tuple(moved),
-        )  # fmt: skip
+        surest = max(moved, key=lambda d: d.cost)
+        for kept in ((), (surest,))[: len(moved) - 1]:
+            taken = [d for d in moved if d not in kept]
+            without, states = self.in_place_of(strict, done, taken, moved)
+            best = min(states, key=lambda s: s.misfit.total, default=done)
+            spared = (len(taken) - 1) * done.misfit.freedom
+            if best is done or reduction(best.misfit, done.misfit) > spared or not self.better(without, best):
+                continue
+            name = new_effect(best, strict)
+            return replace(
+                found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without}, moved=kept,
+                numbers_instead=tuple(taken),
+            )  # fmt: skip
+        return None
 
     def fewest_moved(self, final: SearchState, strict: SearchState | None) -> tuple[SearchState, list[Deviation]]:
         """The state in which as few numbers of the data sheet move as explain what all of them do, and these numbers.
