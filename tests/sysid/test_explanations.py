@@ -147,6 +147,20 @@ def test_one_effect_is_simpler_than_two_numbers_that_say_the_same(model: Model, 
     assert found["residual"]["after"]["validation"] < 1.05
 
 
+@pytest.mark.parametrize(("effect", "size"), [("hose_compliance", 0.4), ("sensor_offset", 0.4)])
+def test_one_effect_is_simpler_beside_numbers_that_are_wrong(model: Model, effect: str, size: float) -> None:
+    """Only some of the numbers that would explain the records are there for the effect."""
+    volume = size * model.value("dead_volume_a")
+    amount = volume / (model.value("bulk_modulus") if effect == "hose_compliance" else model.value("piston_area_a"))
+    (parameter,) = model.library[effect].parameters
+    off = {key: share * model.value(key) for key, share in {"piston_area_b": 0.97, "supply_pressure": 1.03}.items()}
+    bench = model.with_effect(effect, {parameter.name: amount}).with_values(off)
+    found = document(diagnose(model, records(driven(bench))))
+    assert [e["name"] for e in found["effects"] if e["added"]] == [effect], found["verdict"]["text"]
+    assert {d["key"] for d in found["data_sheet"]} <= set(off)
+    assert {d["key"] for d in found["data_sheet_instead"]} <= {"dead_volume_a", "dead_volume_b"}
+
+
 def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> None:
     late = [{c: np.concatenate((v[:1], v[:1], v[:-2])) if c.startswith("pressure") else v for c, v in run.items()}
             for run in runs]  # fmt: skip

@@ -59,9 +59,12 @@ class DataSheetFits(CandidateFits):
         strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
         done, moved = self.fewest_moved(final, strict if final is base else None)
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
-            simpler = self.simpler(found, strict, done, moved)
-            if simpler is not None:
-                return simpler
+            # A wrong area hides what a hose does, too.
+            surest = max(moved, key=lambda d: d.cost, default=None)
+            for taken in (moved, [d for d in moved if d is not surest]):
+                simpler = self.simpler(found, strict, done, moved, taken)
+                if simpler is not None:
+                    return simpler
             places = [self.in_place_of(strict, done, [d], moved) for d in moved]
             every = [(state, i) for i, (_, states) in enumerate(places) for state in states]
             best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
@@ -78,34 +81,36 @@ class DataSheetFits(CandidateFits):
                 replace(d, instead=tuple(new_effect(s, strict) for s in states))
                 for d, (_, states) in zip(moved, places, strict=True)
             ]
+            for name in dict.fromkeys(name for d in moved for name in d.instead):
+                simpler = self.simpler(found, strict, done, moved, [d for d in moved if name in d.instead])
+                if simpler is not None:
+                    return simpler
         misfits = found.misfits
         if misfits:
             misfits = {**misfits, next(reversed(misfits)): done.misfit}
         return replace(found, base=strict, final=done, misfits=misfits, moved=tuple(moved))
 
     def simpler(
-        self, found: SearchResult, strict: SearchState, done: SearchState, moved: Sequence[Deviation]
+        self,
+        found: SearchResult,
+        strict: SearchState,
+        done: SearchState,
+        moved: Sequence[Deviation],
+        taken: Sequence[Deviation],
     ) -> SearchResult | None:
-        """With the one effect that explains what takes several numbers of the data sheet, as BIC has it.
-
-        Of all of them, or of all but the one that is surest: a wrong area hides what a hose does, too.
-        """
-        if len(moved) < 2 or not worse(strict.misfit, done.misfit):
+        """With the one effect that explains what takes several of the numbers ``moved``, as BIC has it."""
+        if len(taken) < 2 or not worse(strict.misfit, done.misfit):
             return None
-        surest = max(moved, key=lambda d: d.cost)
-        for kept in ((), (surest,))[: len(moved) - 1]:
-            taken = [d for d in moved if d not in kept]
-            without, states = self.in_place_of(strict, done, taken, moved)
-            best = min(states, key=lambda s: s.misfit.total, default=done)
-            spared = (len(taken) - 1) * done.misfit.freedom
-            if best is done or reduction(best.misfit, done.misfit) > spared or not self.better(without, best):
-                continue
-            name = new_effect(best, strict)
-            return replace(
-                found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without}, moved=kept,
-                numbers_instead=tuple(taken),
-            )  # fmt: skip
-        return None
+        without, states = self.in_place_of(strict, done, taken, moved)
+        best = min(states, key=lambda s: s.misfit.total, default=done)
+        spared = (len(taken) - 1) * done.misfit.freedom
+        if best is done or reduction(best.misfit, done.misfit) > spared or not self.better(without, best):
+            return None
+        name = new_effect(best, strict)
+        return replace(
+            found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without},
+            moved=tuple(d for d in moved if d not in taken), numbers_instead=tuple(taken),
+        )  # fmt: skip
 
     def fewest_moved(self, final: SearchState, strict: SearchState | None) -> tuple[SearchState, list[Deviation]]:
         """The state in which as few numbers of the data sheet move as explain what all of them do, and these numbers.
