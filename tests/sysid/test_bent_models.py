@@ -18,6 +18,7 @@ from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
 from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, Deviation, priors
 from hydraulic_sysid.diagnosis.search.data_sheet_fits import DataSheetFits
+from hydraulic_sysid.diagnosis.search.drive_faults import costs_with
 from hydraulic_sysid.diagnosis.search.fitting import FAR_OFF, retimed, spiked
 from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit, refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
@@ -173,6 +174,25 @@ def test_what_a_bent_model_hides_shows_beside_the_values_of_its_file(model: Mode
     assert found[0].refit.model.value("moving_mass") == model.value("moving_mass")
     names = [s.effect.name for s in fits.scores(base)]
     assert names.index("structural_flexibility") > 0
+
+
+def test_what_a_low_pass_may_have_held_counts_against_it(model: Model) -> None:
+    """A pure delay and a low pass of the same length leave nearly the same; only the latter begins free."""
+    record = swept(model)
+    late = {c: np.concatenate((record[c][:1], record[c][:-1])) for c in ("pressure_a", "pressure_b")}
+    record = Record("late", record.time, DT, {"drive": record["drive"], "position": record["position"], **late})
+    seen = split([record], [], model, 0.5)
+
+    def on(reading: Reading) -> Linearisation:
+        segments = [replace(s, readings=(Reading(), reading, reading)) for s in seen.segments]
+        return Linearisation.of(model, replace(seen, segments=segments))
+
+    plain, delayed, filtered = on(Reading()), on(Reading(delay=DT)), on(Reading(lag=DT))
+    held = [float(np.sum(cost)) for cost in costs_with(filtered, plain)][0] - float(np.sum(filtered.costs[0]))
+    freedom = 2 * len(seen.segments[0])
+    assert freedom < held < 10.0 * freedom
+    assert costs_with(delayed, plain)[0].sum() == pytest.approx(delayed.costs[0].sum(), abs=0.01 * held)
+    assert costs_with(delayed, plain)[0].sum() < costs_with(filtered, plain)[0].sum()
 
 
 def test_samples_that_turn_out_to_be_spikes_are_worth_what_they_had_left(model: Model) -> None:

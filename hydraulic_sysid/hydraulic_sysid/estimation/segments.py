@@ -155,9 +155,13 @@ class Segments:
     @cached_property
     def timing(self) -> Array:
         """(C,) by how much a delay of a channel changes all that is recorded of it, over the noise, squared [1/s²]."""
-        rate = np.gradient(self.smoothed[:, self.states], self.record.dt, axis=0)
         inside = self.first[:, None] + np.arange(self.samples)
-        return np.asarray(np.sum((rate[inside] / self.noise_std) ** 2, axis=(0, 1)))
+        return np.asarray(np.sum((self._rates[inside] / self.noise_std) ** 2, axis=(0, 1)))
+
+    @property
+    def _rates(self) -> Array:
+        """(N, C) of the channels, smoothed [SI/s]."""
+        return np.asarray(np.gradient(self.smoothed[:, self.states], self.record.dt, axis=0))
 
     def deviation(self, run: Array, priors: Array) -> Array:
         """(S, m) measured − what a simulated ``run`` (S, samples, C) looks like in the record, whitened.
@@ -193,7 +197,7 @@ class Segments:
     def starts_of_filters(self) -> Array:
         """(S, samples·C, L) whitened: what a low pass still holds, in each segment, of what came before it.
 
-        One column per channel behind one; its size is what is not known of the initial state that is read there.
+        One column per channel behind one; its size is what its lag makes of the channel's rate there, and usually.
         """
         lagged = [c for c, reading in enumerate(self.readings) if reading.lag > 0.0]
         if not lagged:
@@ -201,8 +205,9 @@ class Segments:
         found = np.zeros((*self.measured.shape, len(lagged)))
         for column, c in enumerate(lagged):
             fading = np.exp(-self.record.dt / self.readings[c].lag * np.arange(self.samples))
-            place = list(self.free).index(_STATES.index(self.channels[c]))
-            found[:, :, c, column] = self.prior_std[:, place, None] * fading
+            rate = self._rates[:, c]
+            held = self.readings[c].lag * (np.abs(rate[self.first]) + np.sqrt(np.mean(rate**2)))
+            found[:, :, c, column] = held[:, None] * fading
         return self.whitened(found)
 
     def initial_states(self, plant: Plant) -> Array:

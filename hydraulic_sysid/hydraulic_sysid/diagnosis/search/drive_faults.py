@@ -75,9 +75,10 @@ def freedom(now: Sequence[Projection], before: Sequence[Projection]) -> list[Arr
 
 
 def costs_with(at: Linearisation, before: Linearisation) -> list[Array]:
-    """Costs (S,) per record, with what the freedom of disturbances that ``before`` did not have is worth."""
-    if all(s.disturbance.shape[-1] == 0 for s in at.split.segments):
-        return at.costs
+    """Costs (S,) per record, with what freedom that ``before`` did not have is worth.
+
+    Such as disturbances, and what low passes held where segments begin.
+    """
     worth = freedom(at.point.projections, before.point.projections)
     return [cost + own for cost, own in zip(at.costs, worth, strict=True)]
 
