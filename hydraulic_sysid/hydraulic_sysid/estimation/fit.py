@@ -6,7 +6,6 @@ The initial states are eliminated at every step (`projection`), which leaves a s
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -53,9 +52,7 @@ class FitSettings:
     tolerance: float = 0.1
     """The fit is done when another step would be shorter than this many standard errors."""
     least_gain: float = 1e-6
-    """Or when a step lowers the sum of squares by no more than this share …"""
-    far: bool = True
-    """… or, if not ``far``, by that times the mean square over noise: what is far off is not followed to its end."""
+    """Or when a step lowers the sum of squares by no more than this share."""
 
     def seconds(self, model: Model, records: Sequence[Record]) -> float:
         """Of a segment of these records."""
@@ -377,10 +374,10 @@ def fit_segments(
     begin = FitPoint.begin(plant, segments, keys, settings.robust, priors, starts)
     if not keys:
         return Fit(begin.at_rest(), True, 0)
-    steps, noise = 0, math.inf if settings.far else float(sum(s.counted.sum() for s in segments))
+    steps = 0
     while True:
         found: Minimum[FitPoint] = minimise(
-            begin, settings.most_steps - steps, settings.least_gain, settings.tolerance, noise, accepted
+            begin, settings.most_steps - steps, settings.least_gain, settings.tolerance, accepted=accepted
         )
         steps += found.iterations
         end = found.point.unstuck()

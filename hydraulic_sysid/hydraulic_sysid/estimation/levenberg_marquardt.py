@@ -6,7 +6,6 @@ a fit is a value: it knows its cost and its normal equations, and where a step l
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -113,15 +112,13 @@ def minimise(
     most_steps: int,
     least_gain: float,
     tolerance: float = 0.0,
-    noise: float = math.inf,
     accepted: Callable[[int, P], P] = lambda number, point: point,
 ) -> Minimum[P]:
     """The minimum near ``point``.
 
-    It is found when a step lowers the cost by less than ``least_gain`` of it, as many times that as the cost is above
-    what ``noise`` costs, or when the next step would be shorter than ``tolerance`` standard errors.
-    ``accepted`` sees every step and may hand back another point (whose residuals are weighed otherwise) to go on from.
-    Where a step gained what was predicted the point may have derived its normal
+    It is found when a step lowers the cost by less than ``least_gain`` of it, or when the next step would be shorter
+    than ``tolerance`` standard errors. ``accepted`` sees every step and may hand back another point (whose residuals
+    are weighed otherwise) to go on from. Where a step gained what was predicted the point may have derived its normal
     equations from those before; no fit ends by such alone, and steps from there are not counted.
     """
     damping, number = _FIRST_DAMPING, 0
@@ -148,7 +145,7 @@ def minimise(
             return Minimum(point, not tolerance or _ahead(normal, point.parameters) < _UPHILL, number)
         damping = max(damping / 5.0, LEAST_DAMPING)
         gained, known = point.cost - better.cost, point.exact
-        done = gained < least_gain * point.cost * max(1.0, point.cost / noise)
+        done = gained < least_gain * point.cost
         if done or not _FOLLOWED[0] < gained / max(normal.reduction(change), 1e-300) < _FOLLOWED[1]:
             better = _as(better, better.made_exact())
         point = accepted(number, better)

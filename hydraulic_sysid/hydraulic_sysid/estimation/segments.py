@@ -36,7 +36,6 @@ MEASURED = ("position", "pressure_a", "pressure_b")
 """Channels that are fitted, where a record has them."""
 _STATES = ("position", "velocity", "pressure_a", "pressure_b")  # the first of every plant
 _FEWEST = 20  # samples of a segment
-_NEAR = 1  # segment lengths before each segment, from which on a look propagates what no sensor sees
 _SMOOTHING = 15  # samples of the quadratic through which initial values are read
 STICK_SPEED = 2e-3  # m/s; above, dry friction has its full direction
 _TURNING = 0.005  # s: over twice that the acceleration of a piston that hardly moves is read
@@ -86,8 +85,6 @@ class Segments:
     disturbance: Array
     loudness: Array
     """(S, C) by how many times the noise of a channel is stronger in a segment than in all."""
-    reach: int | None = None
-    """Samples before each segment along which states that no sensor sees are propagated; None: all there are."""
 
     def __len__(self) -> int:
         return len(self.first)
@@ -104,10 +101,6 @@ class Segments:
             disturbance=self.disturbance[chosen],
             loudness=self.loudness[chosen],
         )
-
-    def for_a_look(self) -> Segments:
-        """The same, states that no sensor sees being propagated from shortly before each segment on only."""
-        return replace(self, reach=_NEAR * self.samples)
 
     @property
     def noise_std(self) -> Array:

@@ -232,9 +232,7 @@ class Shooting:
             if len(self._known) > _MOST_KNOWN:
                 self._known.clear()
             segments = self.segments[i]
-            known = plant.track(
-                segments.drive, segments.record.dt, segments.first, segments.smoothed, segments.reach
-            )
+            known = plant.track(segments.drive, segments.record.dt, segments.first, segments.smoothed)
             self._known[i, path] = known
         return known
 

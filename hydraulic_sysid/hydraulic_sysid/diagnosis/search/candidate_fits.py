@@ -12,7 +12,7 @@ from hydraulic_sysid.estimation.parallel import results
 
 from .candidate_table import candidate_table
 from .candidates import candidates, delays, observed, subsystem
-from .fitting import FAR_OFF, Fitting, Task, with_fitted_values, without_derivative
+from .fitting import ENOUGH, FAR_OFF, Fitting, Task, with_fitted_values, without_derivative
 from .frozen_jacobian import Refit, refit, refit_rounded
 from .linearisation import Linearisation
 from .misfit import misfit
@@ -108,8 +108,7 @@ class CandidateFits(Fitting):
         self, base: SearchState, chosen: Sequence[CandidateScore], full: int = FULL
     ) -> Iterator[CandidateRefit]:
         """Candidates refitted on a state, in their order; the first of them from all of their starts."""
-        at = base.linearisation
-        _ = at.columns, at.normal, at.look[0].normal, at.look[0].costs  # once, for all that work at the same time
+        _ = base.linearisation.columns, base.linearisation.normal  # once, for all that work at the same time
         jobs = results(lambda job: self._refit_from(base, job[1], job[0] < full), enumerate(chosen))
         for one in chosen:
             self.say(f"refitting with {one.effect.name}")
@@ -176,12 +175,11 @@ class CandidateFits(Fitting):
             every += self.beside_filed_values(base) if base.misfit.variance >= FAR_OFF else []
         if len(every) <= FULL and len(every) == len(near):
             return every
-        few = [s.for_a_look() for s in base.linearisation.split.of(base.linearisation.informing())]
         found = []
         for r in every:
             self.say(f"setting {r.name} against others")
             try:
-                done = self.fitted_to(few, r.refit.model, self._few)
+                done = self.fitted_to(self.split.some(ENOUGH), r.refit.model, self._few)
             except SimulationError:
                 continue
             fitted = replace(r.refit, model=r.refit.model.with_values(done.values))

@@ -53,7 +53,7 @@ class Remaining:
     ) -> Remaining:
         """What is left at a fitted model."""
         found = nonparametric_curves(at, lambda _: None) if curves is None else curves
-        return cls(at.sample(SAMPLED), found, beside)
+        return cls(at.sample(SAMPLED)[0], found, beside)
 
 
 @dataclass(frozen=True)

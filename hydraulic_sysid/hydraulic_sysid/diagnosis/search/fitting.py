@@ -75,9 +75,8 @@ class Fitting:
         self.priors = priors(task.given)
         self._starts: dict[frozenset[str], KnownStarts] = {}
         self._first = replace(task.settings, least_gain=FIRST_GAIN)
-        self._few = replace(task.settings, most_steps=FEW_STEPS, least_gain=FEW_GAIN, far=False)
+        self._few = replace(task.settings, most_steps=FEW_STEPS, least_gain=FEW_GAIN)
         self._last = replace(task.settings, most_steps=LAST_STEPS, least_gain=LAST_GAIN)
-        self._look = replace(self._last, far=False)
 
     @classmethod
     def of(
@@ -240,7 +239,7 @@ class Fitting:
 
     def looked_at(self, model: Model) -> float:
         """What a fit to a few segments leaves of them."""
-        return self.fitted_to(self.split.some(LOOK), model, self._look).cost
+        return self.fitted_to(self.split.some(LOOK), model, self._last).cost
 
     def left_on_few(self, state: SearchState) -> float:
         """What a state leaves of the same segments."""

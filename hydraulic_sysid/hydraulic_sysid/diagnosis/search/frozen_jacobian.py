@@ -26,8 +26,7 @@ from .linearisation import Linearisation
 _ENDLESS = 1e100  # residual over noise of a run that has left all bounds
 _FLAT = 2e-4  # relative gain of a step that ends the refit
 _NOTHING = 1e-6  # relative change of the sum of squares: none
-_MOST_STEPS = 10  # on the segments that inform, …
-_LAST_STEPS = 2  # … and on all
+_MOST_STEPS = 10
 _SHARES = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.05)  # of the predicted size, to start from
 _ROUNDS = 2  # times that initial states are moved at the end
 _ROUNDED = 6  # the same where what is measured is rounded, and the sensitivities only point the way
@@ -48,14 +47,10 @@ class Refit:
 def refit(at: Linearisation, model: Model, start: Mapping[str, float]) -> Refit:
     """Fit ``model``, which has the linearisation's effects and more, from its values and ``start`` [SI, by key]."""
     own = tuple(k for k in start if model.entry(k).free)
-    begin = _begin(at.look[0], model, start, own)
+    begin = _begin(at, model, start, own)
     if begin is None:
         return Refit(model, at.costs)
-    there = minimise(begin, _MOST_STEPS, _FLAT).point
-    whole = FrozenPoint.at(at, there.plant, there.parameters, at.point.initial_states)
-    if whole is None:
-        return Refit(model, at.costs)
-    point = minimise(whole.at_rest(1), _LAST_STEPS, _FLAT).point
+    point = minimise(begin, _MOST_STEPS, _FLAT).point
     values = {**start, **point.parameters.by_key}
     return Refit(model.with_values(values, source="fitted"), point.at_rest(_ROUNDS).costs)
 

@@ -46,15 +46,11 @@ class Split:
     @property
     def to_fit(self) -> list[Segments]:
         """The segments that a fit sees, without records of which it sees none."""
-        return self.of(self.fit)
-
-    def of(self, chosen: Sequence[Mask]) -> list[Segments]:
-        """The ``chosen[i]`` (S_i,) segments, without records of which there are none."""
-        return [s.subset(c) for s, c in zip(self.segments, chosen, strict=True) if c.any()]
+        return [s.subset(f) for s, f in zip(self.segments, self.fit, strict=True) if f.any()]
 
     def some(self, most: int) -> list[Segments]:
-        """About ``most`` of those that a fit sees, spread over all records, for a look."""
-        return [s.for_a_look() for s in spread(self.to_fit, most)]
+        """About ``most`` of those that a fit sees, spread over all records."""
+        return spread(self.to_fit, most)
 
     def records(self, validation: bool = False) -> list[Record]:
         """Those of which at least a part is fitted, or those that are named for ``validation``."""

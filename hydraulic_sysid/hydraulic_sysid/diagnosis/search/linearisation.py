@@ -18,8 +18,6 @@ from hydraulic_sysid.estimation.parameters import NO_PRIORS, Parameters, Priors
 
 from .holdout import Split
 
-ENOUGH = 24  # segments that do for a look
-
 
 @dataclass(frozen=True)
 class Linearisation:
@@ -107,41 +105,16 @@ class Linearisation:
         runs = [self.point.shooting.try_out(plant, self.point.initial_states) for plant in plants]
         return [np.stack([run[i] - p.raw for run in runs], axis=-1) for i, p in enumerate(self.point.projections)]
 
-    def sample(self, most: int) -> Linearisation:
-        """The same on about ``most`` segments for fitting, spread over all records."""
-        every = max(1, round(sum(int(f.sum()) for f in self.split.fit) / most))
-        chosen = [np.zeros_like(f) for f in self.split.fit]
-        for keep, fit in zip(chosen, self.split.fit, strict=True):
+    def sample(self, most: int) -> tuple[Linearisation, float]:
+        """The same on about ``most`` segments for fitting, spread over all records; and what share of them that is."""
+        total = sum(int(f.sum()) for f in self.split.fit)
+        every = max(1, round(total / most))
+        chosen = []
+        for fit in self.split.fit:
+            keep = np.zeros_like(fit)
             keep[np.flatnonzero(fit)[::every]] = True
-        return self._subset(chosen)
-
-    @cached_property
-    def look(self) -> tuple[Linearisation, float]:
-        """The same on the segments that inform, for a look; and what share of the sum of squares they leave."""
-        chosen = self.informing()
-        left = sum(float(c[k].sum()) for c, k in zip(self.costs, chosen, strict=True))
-        every = sum(float(c[f].sum()) for c, f in zip(self.costs, self.split.fit, strict=True))
-        part = self._subset(chosen)
-        shooting = replace(part.point.shooting, segments=[s.for_a_look() for s in part.split.segments])
-        raw = shooting.residuals(part.point.plant, part.point.initial_states)
-        seen = [p.with_raw(r) for p, r in zip(part.point.projections, raw, strict=True)]
-        point = replace(part.point, shooting=shooting, projections=seen)
-        split = replace(part.split, segments=list(shooting.segments))
-        return replace(part, split=split, point=point), left / max(every, 1e-300)
-
-    def informing(self) -> list[Mask]:
-        """Segments for fitting (S_i,) that do for a look: half spread over all records, half that leave most else."""
-        place = np.concatenate([np.full(len(f), i) for i, f in enumerate(self.split.fit)])
-        fit = np.flatnonzero(np.concatenate(self.split.fit))
-        if len(fit) > ENOUGH:
-            evenly = fit[:: max(1, round(2 * len(fit) / ENOUGH))]
-            rest = np.setdiff1d(fit, evenly)
-            counted = np.concatenate([s.counted for s in self.split.segments])
-            worst = rest[np.argsort(-(np.concatenate(self.costs) / counted)[rest], kind="stable")]
-            fit = np.concatenate((evenly, worst[: ENOUGH - len(evenly)]))
-        chosen = np.zeros(len(place), dtype=bool)
-        chosen[fit] = True
-        return [chosen[place == i] for i in range(len(self.split.fit))]
+            chosen.append(keep)
+        return self._subset(chosen), sum(int(c.sum()) for c in chosen) / max(total, 1)
 
     def of_one_record(self) -> Linearisation:
         """The same on the segments for fitting of the record that leaves most."""
@@ -157,8 +130,6 @@ class Linearisation:
         point = self.point.subset(chosen)
         split = Split(list(point.shooting.segments), [np.ones(len(s), dtype=bool) for s in point.shooting.segments])
         beyond = [b[c] for b, c in zip(self.beyond, chosen, strict=True) if c.any()]
-        if self.known is None:  # there are columns
-            point = replace(point, derived=[own[c] for own, c in zip(self.columns, chosen, strict=True) if c.any()])
         return Linearisation(self.model, split, point, beyond)
 
     def _inner(self, left: Sequence[Array], right: Sequence[Array]) -> Array:

@@ -22,9 +22,9 @@ from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from .candidates import subsystem
 from .linearisation import Linearisation
 from .nonparametric import FILES
+from .score_test import ENOUGH
 
 KNOTS = 9
-ENOUGH = 50  # segments that do for a curve, spread over all records
 _RIDGE = 1e-6  # of the largest diagonal: knots that nothing visits
 _VISITED = 1e-3  # of the largest information: a knot below is not shown
 _RANGE = (0.005, 0.995)  # quantiles between which knots are laid
@@ -71,7 +71,7 @@ class Place:
 
 def nonparametric_curves(at: Linearisation, say: Callable[[str], None]) -> list[NonparametricCurve]:
     """All curves, the one that explains most first. Empty for a plant that takes none of them."""
-    part = at.sample(ENOUGH)
+    part, _ = at.sample(ENOUGH)
     found = (_curve(part, place) for place in places(part, say))
     return sorted((c for c in found if c is not None), key=lambda c: -c.reduction)
 

@@ -25,6 +25,7 @@ from hydraulic_sysid.estimation.segments import Segments
 from .drive_faults import DRIVE_HYPOTHESES, DriveHypothesis, disturbed, freedom
 from .linearisation import Linearisation
 
+ENOUGH = 50  # segments that do for a look
 MOST = 64.0  # sampling intervals by which a channel may be late, or per cent by which its gain may be off
 TRIED = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of these, from which the best size is searched
 PER_CENT = 0.01
@@ -163,7 +164,7 @@ def recording_faults(at: Linearisation, disturbances: bool = True) -> list[Recor
 
     ``disturbances``: whether those of the drive are tried, too.
     """
-    part, share = at.look
+    part, share = at.sample(ENOUGH)
     point = part.point
     runs = point.shooting.simulated(point.plant, point.initial_states)
     before = _cost(part, [p.raw for p in point.projections])
@@ -192,7 +193,7 @@ def resized(at: Linearisation, fault: RecordingFault) -> RecordingFault:
     """The same fault with the size that fits best now; the linearisation's segments have it already."""
     if isinstance(fault.hypothesis, DriveHypothesis):
         return fault
-    part, share = at.look
+    part, share = at.sample(ENOUGH)
     segments = [fault.hypothesis.applied(s, -fault.size) for s in part.point.shooting.segments]
     point = replace(part.point, shooting=replace(part.point.shooting, segments=segments))
     part = replace(part, point=point)

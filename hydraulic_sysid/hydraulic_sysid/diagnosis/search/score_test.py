@@ -24,6 +24,7 @@ from hydraulic_sysid.estimation.parameters import Parameters
 from .candidates import LARGE, SIZES, SMALL, Probe, RecordFeatures, between, inverse, observed, probes
 from .linearisation import Linearisation
 
+ENOUGH = 50  # segments that do for a look, spread over all records
 MANY = 8  # groups of probes of one effect, beyond which …
 NEAREST = 4  # … only those are looked at on all of these that promise most on one record's
 TOO_FAR = 1.0  # times the sum of squares that is left: a probe that changes more than this is no first order
@@ -54,7 +55,7 @@ class _Prediction:
 
 def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures) -> list[CandidateScore]:
     """All candidates, the best first; reductions of all segments for fitting, of which a sample is looked at."""
-    part, share = at.look
+    part, share = at.sample(ENOUGH)
     one = part.of_one_record()
     _ = part.normal, part.costs, one.normal, one.costs  # once, for all that work at the same time
     found = list(results(lambda effect: _score(part, one, effect, features), effects))
