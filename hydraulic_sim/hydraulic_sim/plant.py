@@ -335,15 +335,12 @@ class Plant:
         keys = ["drive_limit", *(f"{e.name}.{p.name}" for e in inner for p in e.parameters)]
         return (*(e.name for e in inner), *(self.value(k) for k in keys))
 
-    def track(
-        self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike, reach: int | None = None
-    ) -> tuple[Array, Array]:
+    def track(self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike) -> tuple[Array, Array]:
         """States at each start, those that no sensor sees propagated along the record, the others as measured.
 
         ``drive`` (N,) [V]; ``starts`` (S,) rising sample indices; ``seen`` (N, 4): position, velocity, pressures of
-        A and B as measured, NaN where they were not; ``reach``: samples before each start along which they are
-        propagated, from where they were at the start before (None: all). Returns the states (S, n_states) and memories
-        (S, n_memory); those of the position's sensor begin anew, as what was measured has passed it.
+        A and B as measured, NaN where they were not. Returns the states (S, n_states) and memories (S, n_memory);
+        those of the position's sensor begin anew, as what was measured has passed it.
 
         :raises SimulationError: a state stops being finite.
         """
@@ -359,9 +356,8 @@ class Plant:
         x, memory, failure = begin.states.copy(), begin.memory.copy(), np.zeros(2)
         states, memories = np.empty((len(first), x.size)), np.empty((len(first), memory.size))
         done = self._compiled.track(
-            u, dt, self.longest_step, self._turn, measured, self._corrected_every, first,
-            len(u) if reach is None else reach, self._on, self._parameters, self._hydraulic, x, memory, states,
-            memories, failure,
+            u, dt, self.longest_step, self._turn, measured, self._corrected_every, first, self._on, self._parameters,
+            self._hydraulic, x, memory, states, memories, failure,
         )  # fmt: skip
         if done < len(first):
             sample = min(max(int(failure[0] / dt + 1e-6), 0), len(u) - 1)

@@ -37,20 +37,6 @@ def test_runs_from_within_a_record_go_on_as_the_whole_did(bench: Model, effect: 
     assert np.abs(again["position"] - whole).max() < 0.01 * moved
 
 
-@pytest.mark.parametrize("effect", ["spool_dynamics", "supply_droop"])
-def test_what_was_long_ago_is_forgotten(bench: Model, effect: str) -> None:
-    """Followed over a part of the way to each start, states and memories are those of the whole record."""
-    plant = Plant(bench.with_effect(effect))
-    drive, seen, starts = slowly(plant)
-    starts = starts[3::8]
-    smoothed = np.stack([seen[c] for c in SEEN], axis=-1)
-    whole, long, short = (plant.track(drive, DT, starts, smoothed, reach) for reach in (None, 1500, 1))
-    for all_of_it, part in zip(whole, long, strict=True):
-        spread = np.ptp(all_of_it, axis=0) + 1e-12
-        assert (np.abs(part - all_of_it) < 0.02 * spread).all()
-    assert any((np.abs(h - w) > 0.02 * (np.ptp(w, axis=0) + 1e-12)).any() for w, h in zip(whole, short, strict=True))
-
-
 @pytest.mark.parametrize(
     ("effect", "values", "left"),
     [
