@@ -188,7 +188,7 @@ def test_what_a_low_pass_may_have_held_counts_against_it(model: Model) -> None:
         return Linearisation.of(model, replace(seen, segments=segments))
 
     plain, delayed, filtered = on(Reading()), on(Reading(delay=DT)), on(Reading(lag=DT))
-    held = [float(np.sum(cost)) for cost in costs_with(filtered, plain)][0] - float(np.sum(filtered.costs[0]))
+    held = costs_with(filtered, plain)[0].sum() - filtered.costs[0].sum()
     freedom = 2 * len(seen.segments[0])
     assert freedom < held < 10.0 * freedom
     assert costs_with(delayed, plain)[0].sum() == pytest.approx(delayed.costs[0].sum(), abs=0.01 * held)

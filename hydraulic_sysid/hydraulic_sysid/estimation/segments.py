@@ -151,7 +151,7 @@ class Segments:
         inside = self.first[:, None] + np.arange(self.samples)
         return np.asarray(np.sum((self._rates[inside] / self.noise_std) ** 2, axis=(0, 1)))
 
-    @property
+    @cached_property
     def _rates(self) -> Array:
         """(N, C) of the channels, smoothed [SI/s]."""
         return np.asarray(np.gradient(self.smoothed[:, self.states], self.record.dt, axis=0))

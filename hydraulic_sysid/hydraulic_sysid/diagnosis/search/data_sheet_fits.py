@@ -61,8 +61,9 @@ class DataSheetFits(CandidateFits):
         if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
             # A wrong area hides what a hose does, too.
             surest = max(moved, key=lambda d: d.cost, default=None)
-            for taken in (moved, [d for d in moved if d is not surest]):
-                simpler = self.simpler(found, strict, done, moved, taken)
+            tried = [tuple(d.key for d in moved), tuple(d.key for d in moved if d is not surest)]
+            for keys in tried:
+                simpler = self.simpler(found, strict, done, moved, keys)
                 if simpler is not None:
                     return simpler
             places = [self.in_place_of(strict, done, [d], moved) for d in moved]
@@ -81,8 +82,9 @@ class DataSheetFits(CandidateFits):
                 replace(d, instead=tuple(new_effect(s, strict) for s in states))
                 for d, (_, states) in zip(moved, places, strict=True)
             ]
-            for name in dict.fromkeys(name for d in moved for name in d.instead):
-                simpler = self.simpler(found, strict, done, moved, [d for d in moved if name in d.instead])
+            shared = [tuple(d.key for d in moved if name in d.instead) for one in moved for name in one.instead]
+            for keys in dict.fromkeys(shared):
+                simpler = None if keys in tried else self.simpler(found, strict, done, moved, keys)
                 if simpler is not None:
                     return simpler
         misfits = found.misfits
@@ -96,9 +98,10 @@ class DataSheetFits(CandidateFits):
         strict: SearchState,
         done: SearchState,
         moved: Sequence[Deviation],
-        taken: Sequence[Deviation],
+        keys: Sequence[str],
     ) -> SearchResult | None:
-        """With the one effect that explains what takes several of the numbers ``moved``, as BIC has it."""
+        """With the one effect that does what several of the numbers ``moved``, those of ``keys``, do, as BIC has it."""
+        taken = [d for d in moved if d.key in keys]
         if len(taken) < 2 or not worse(strict.misfit, done.misfit):
             return None
         without, states = self.in_place_of(strict, done, taken, moved)
