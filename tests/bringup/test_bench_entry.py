@@ -25,7 +25,6 @@ ROOT = Path(__file__).resolve().parents[2]
 ENTRY = Path("ros_ws/src/hydraulic_bringup/hydraulic_bringup")
 PATIENCE_S = 150.0
 TIMING = "pytest.mark" + ".timing"
-BESIDE = "pytest.mark" + ".beside"
 
 # Stands for the interpreter of the environment: writes down how it was called, and does colcon's work.
 FAKE_PYTHON = """#!/bin/sh
@@ -429,47 +428,6 @@ def test_only_tests_of_the_wall_clock_are_repeated(built: FakeCheckout) -> None:
     assert answer.stdout.splitlines()[-1].startswith("=== 6 passed, 3 repeated, 1 warnings in ")
 
 
-def test_what_has_patience_runs_beside_the_others_and_is_repeated_alone(built: FakeCheckout) -> None:
-    for name, text in (("pace", TIMING), ("machine", f"{TIMING} {BESIDE}"), ("seal", "")):
-        file = built.root / f"tests/pump/test_{name}.py"
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text)
-    answer = built.bench("test", SEEPS="timing and beside")
-    calls = built.calls()
-    runs = [re.sub(r"-m pytest|-o cache_dir=\S+|-m | -n \d+", "", call).strip() for call in calls]
-    runs = [call for call in runs if "tests" in call]
-    beside = "timing and beside tests/pump/test_machine.py"
-    others = "not timing -p xdist --dist=loadfile --no-loadscope-reorder tests"
-    alone = "timing and not beside tests/pump/test_machine.py tests/pump/test_pace.py"
-    assert set(runs[:2]) == {beside, others}
-    assert runs[2:] == [alone, f"{beside} --last-failed"]
-    (again,) = (call for call in calls if call.endswith("--last-failed"))
-    assert again.removesuffix(" --last-failed") in calls, "it knows from the first what failed"
-    assert answer.returncode == 0, answer.stdout
-    assert answer.stdout.index("collected 2 items") < answer.stdout.index("test_seal.py F")
-    assert answer.stdout.splitlines()[-1].startswith("=== 8 passed, 3 repeated, 2 warnings in ")
-
-
-def test_what_has_patience_is_judged_as_all_others(built: FakeCheckout) -> None:
-    file = built.root / "tests/pump/test_machine.py"
-    file.parent.mkdir(parents=True)
-    file.write_text(f"{TIMING} {BESIDE}")
-    answer = built.bench("test", LEAKS="timing and beside")
-    assert answer.returncode == 1
-    assert answer.stdout.splitlines()[-1].startswith("=== 1 failed, 6 passed, 3 repeated, 2 warnings, 2 errors in ")
-    assert "Failed, see above:" in answer.stdout
-
-
-def test_what_runs_beside_does_not_outlive_the_others(tmp_path: Path) -> None:
-    slow = ["sh", "-c", "echo begun; exec sleep 60"]
-    with (
-        pytest.raises(KeyboardInterrupt),
-        test_verb.Pytest(slow, tmp_path, dict(os.environ), aside=tmp_path / "said") as run,
-    ):
-        raise KeyboardInterrupt
-    assert run.finish().code == -signal.SIGINT
-
-
 def test_what_protects_the_bench_is_not_among_them() -> None:
     """Gate, faults, contract and control have to pass at once; a further file gets here on purpose or not at all."""
     files = [file for file in (ROOT / "tests").rglob("test_*.py") if TIMING in file.read_text()]
@@ -495,7 +453,7 @@ def test_what_hangs_is_interrupted_and_has_failed(
     trap = "''" if deaf else "'echo === 2 failed in 1 s ===; exit 2'"
     hung = f"trap {trap} INT; echo test_seal.py F; sleep 60 & while true; do sleep 0.1; done"
     begun = time.monotonic()
-    run = test_verb.Pytest(["sh", "-c", hung], tmp_path, dict(os.environ)).finish()
+    run = test_verb.Pytest(["sh", "-c", hung], tmp_path, dict(os.environ))
     assert run.code == (-signal.SIGKILL if deaf else 2)
     assert "test_seal.py F" in capfd.readouterr().out
     assert test_verb.summed([run.counted], 1.0).startswith("=== 1 errors" if deaf else "=== 2 failed")
@@ -508,8 +466,8 @@ def test_tests_that_somebody_asks_for_may_take_as_long_as_they_do(
     """A debugger stands still for an hour."""
     monkeypatch.setattr(test_verb, "LONGEST_S", 0.2)
     slow = ["sh", "-c", "sleep 1.5; echo === 1 passed in 1.5 s ==="]
-    assert test_verb.Pytest(slow, tmp_path, dict(os.environ), longest=60.0).finish().code == 0
-    assert test_verb.Pytest(slow, tmp_path, dict(os.environ)).finish().code != 0
+    assert test_verb.Pytest(slow, tmp_path, dict(os.environ), longest=60.0).code == 0
+    assert test_verb.Pytest(slow, tmp_path, dict(os.environ)).code != 0
 
 
 @pytest.mark.parametrize("marker", ["not timing", "timing"])

@@ -50,8 +50,7 @@ NODES = (0x10, 0x20, 0x30, 0x31, 0x32)
 SYNC, DRIVE, STATUS, POSITION = 0x080, 0x510, 0x490, 0x1A0
 SAMPLED = (STATUS, POSITION, 0x1B0, 0x1B1, 0x1B2)
 
-# The kernel sends the SYNC; a machine that is busy besides is reckoned with.
-pytestmark = [pytest.mark.timeout(MACHINE_S + 60.0), pytest.mark.timing, pytest.mark.beside]
+pytestmark = [pytest.mark.timeout(MACHINE_S + 60.0), pytest.mark.timing]  # the kernel sends the SYNC
 
 
 @dataclass
