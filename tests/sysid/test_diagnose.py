@@ -147,6 +147,19 @@ def test_a_line_that_the_valve_modulates_is_found_between_side_bands(line: float
     assert spectral_lines([segments], [residual])[0] == pytest.approx(line, abs=0.01)
 
 
+def test_a_line_too_weak_in_each_record_shows_in_all_together() -> None:
+    time, noise = DT * np.arange(10001), np.random.default_rng(5)
+    every = []
+    for _ in range(6):
+        seen = 0.06 * np.sin(2.0 * np.pi * 167.7 * time) + noise.standard_normal(time.size)
+        record = Record.sampled("r", DT, {"drive": np.ones(time.size), "position": np.zeros(time.size)})
+        (segments,) = cut([record], "mechanical", 0.5)
+        index = segments.first[:, None] + np.arange(segments.samples)
+        every.append((segments, np.concatenate([seen[index], np.zeros((len(segments), 2))], axis=1)))
+    assert not any(spectral_lines([segments], [residual]) for segments, residual in every)
+    assert spectral_lines(*map(list, zip(*every, strict=True))) == pytest.approx((167.7,), abs=0.03)
+
+
 def test_an_angle_is_tried_with_every_frequency(model) -> None:
     tried = [group[0].values for group in probes(model.library["pump_ripple"], RecordFeatures(lines=(31.0,)))]
     angles = {v["pump_ripple.phase"] for v in tried if v["pump_ripple.frequency"] == 31.0}

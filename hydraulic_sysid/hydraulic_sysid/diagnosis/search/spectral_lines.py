@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import next_fast_len
 from scipy.ndimage import median_filter
+from scipy.stats import gamma
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sysid.estimation.noise import code_step
@@ -47,23 +48,35 @@ def _converted(segments: Segments) -> bool:
 def spectral_lines(segments: Sequence[Segments], residuals: Sequence[Array]) -> tuple[float, ...]:
     """The strongest lines [Hz] of residuals (S, m) per record, at most two. Records shorter than a second show none.
 
+    A line shows in one record, or in all of them together where it is as unlikely by chance (powers of noise add up to
+    a gamma distribution).
+
     What is periodic in the plant acts through a valve that reverses: of a line that leaves side bands, often higher
     than itself. They fall together again where the residual is turned over with the drive, and each record has its own;
     so the line is where the residual and the turned one, of all records, stand out most.
     """
     spectra = [found for found in map(_spectrum, segments, residuals) if found is not None]
-    peaks = sorted(((float(s.clear.max()), float(s.frequency[np.argmax(s.clear)])) for s in spectra), reverse=True)
+    if not spectra:
+        return ()
+    finest = max(spectra, key=lambda s: len(s.frequency)).frequency
+    together = np.sum([np.interp(finest, s.frequency, s.clear, right=0.0) for s in spectra], axis=0)
+    heights = [(finest, together / _by_chance(len(spectra))), *((s.frequency, s.clear / STANDS_OUT) for s in spectra)]
+    peaks = sorted(((float(h.max()), float(frequency[np.argmax(h)])) for frequency, h in heights), reverse=True)
     distinct: list[float] = []
     for height, at in peaks:
-        if height <= STANDS_OUT or len(distinct) == _MOST:
+        if height <= 1.0 or len(distinct) == _MOST:
             break
-        finest = max(spectra, key=lambda s: len(s.frequency)).frequency
         grid = finest[(np.abs(finest - at) <= _BESIDE) & (finest > _SLOWEST)]
         score = sum(np.interp(grid, s.frequency, s.ratio) for s in spectra)
         line = float(grid[np.argmax(score)])
         if all(abs(line - other) > 0.02 * other for other in distinct):
             distinct.append(line)
     return tuple(distinct)
+
+
+def _by_chance(records: int) -> float:
+    """What the sum over records exceeds as seldom as one of them does `STANDS_OUT`, each over its median."""
+    return float(gamma.isf(2.0**-STANDS_OUT, records) / math.log(2.0))
 
 
 @dataclass(frozen=True)
