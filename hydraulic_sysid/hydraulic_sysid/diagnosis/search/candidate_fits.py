@@ -75,9 +75,10 @@ class CandidateFits(Fitting):
         if not scores:
             return base
         least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)
-        # What rounding explains shows once the initial states have settled with it.
-        worth = [s for s in scores if s.reduction > least or observed(s.effect)]
+        worth = [s for s in scores if s.reduction > least and not observed(s.effect)]
         best = varied(worth, [s.effect for s in worth], ALIKE if most < MOST_REFITS else most)[:most]
+        # What rounding explains shows once the initial states have settled with it.
+        best += [s for s in scores if observed(s.effect)]
         every: list[CandidateRefit] = []
         self.tried = (base, every)
         self._show(base, scores, every)

@@ -40,15 +40,17 @@ class RecordingFits(DataSheetFits):
         self._first_effect: tuple[SearchState | None, SearchState | None] = (None, None)
         self.as_recorded: SearchState | None = None
         """Before any fault was assumed."""
+        self._assumed = 0
+        """How many faults were, named or not."""
 
     def recorded(self, base: SearchState) -> SearchState:
         """A state with its candidates explored, and with every fault of the recording that explains more than they."""
-        for tried in range(MOST_FAULTS + 1):
+        while True:
             self.path = [base]
             nothing = self.nothing_left(base)
             if not nothing:
                 base = self.explore(base)
-            if tried == MOST_FAULTS:
+            if self._assumed == MOST_FAULTS:
                 break
             self.say("faults of the recording")
             # A disturbance is free enough to take up what laws leave, the reading of a channel is not.
@@ -60,31 +62,59 @@ class RecordingFits(DataSheetFits):
             enough = RIVAL * (base.misfit.fit - best)
             named = [f for f in faults if not base.misfit.little or f.unusual(self.split.interval)]
             self.rivals = [f for f in named if not f.linear and f.reduction >= enough][:FULL]
-            # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
             least = base.misfit.fit - best - base.misfit.least
-            readings = [f for f in faults if not f.linear]
-            near = [f for f in readings if f.reduction >= max(NEAR * readings[0].reduction, GLIMPSED * least)][:FULL]
-            if faults and faults[0].linear and faults[0].reduction >= least:
-                near = faults[:1]
-            if not near:
-                break
-            found = self.plainest(base, [self.with_fault(base, f) for f in near])
-            if not material(base.misfit, found.misfit) or explained(base.misfit, found.misfit) < FURTHER:
-                break
-            if leaves_most(base.misfit, found.misfit) or base.misfit.fit - found.misfit.fit < least:
+            found = self.fault(base, faults, least)
+            if found is None or leaves_most(base.misfit, found.misfit) or base.misfit.fit - found.misfit.fit < least:
                 break
             # A quick refit falls short of what an effect explains; the fault has been fitted to the end.
             effect = self.first_effect(base)
             if effect is not None and effect.misfit.total < found.misfit.total:
                 self._first_effect = base, effect
                 break
-            # Filters of sound transducers delay by a part of a sampling interval, too: that is known, but not named.
-            if not base.misfit.little or found.fault.unusual(self.split.interval):
-                self.as_recorded = self.as_recorded or base
-                self.faults = together(self.faults, found.fault)
-            self.split, self.path = found.split, [found.state]
+            self.assume(found, base, base)
+            self.path = [found.state]
             base = self.loosened(self.judged(found.state))
         return base if base.scores else self.rounded(base)
+
+    def fault(self, base: SearchState, faults: Sequence[RecordingFault], least: float) -> FaultFit | None:
+        """The best of these faults, fitted; None where none is worth it, or promises to explain ``least``."""
+        # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
+        readings = [f for f in faults if not f.linear]
+        near = [f for f in readings if f.reduction >= max(NEAR * readings[0].reduction, GLIMPSED * least)][:FULL]
+        if faults and faults[0].linear and faults[0].reduction >= least:
+            near = faults[:1]
+        if not near:
+            return None
+        found = self.plainest(base, [self.with_fault(base, f) for f in near])
+        worth = material(base.misfit, found.misfit) and explained(base.misfit, found.misfit) >= FURTHER
+        return found if worth else None
+
+    def assume(self, found: FaultFit, beside: SearchState, base: SearchState) -> None:
+        """Take the records to have the fault that was found ``beside`` a state.
+
+        Filters of sound transducers delay by a part of a sampling interval, too: that is known, but not named.
+        """
+        if not beside.misfit.little or found.fault.unusual(self.split.interval):
+            self.as_recorded = self.as_recorded or base
+            self.faults = together(self.faults, found.fault)
+        self.split = found.split
+        self._assumed += 1
+
+    def fault_beside(self, base: SearchState, state: SearchState, further: SearchState | None) -> SearchState | None:
+        """A ``state`` with effects on records with a fault that explains more than a ``further`` effect, if any does.
+
+        What hides a small delay of the pressures may itself be much larger.
+        """
+        if self._assumed == MOST_FAULTS or (further is None and state.misfit.variance - 1.0 < NOTHING_LEFT):
+            return None
+        self.say("faults of the recording")
+        best = state.misfit.fit if further is None else further.misfit.fit
+        readings = [f for f in recording_faults(state.linearisation, disturbances=False) if not f.linear]
+        found = self.fault(state, readings, state.misfit.fit - best)
+        if found is None or (further is not None and _plainer(further, state, found)):
+            return None
+        self.assume(found, state, base)
+        return self.judged(found.state)
 
     def first_effect(self, base: SearchState) -> SearchState | None:
         """A state with the effect that explains most of what it leaves, fitted to the end; None where none is worth it.
@@ -177,6 +207,12 @@ class RecordingFits(DataSheetFits):
         except SimulationError:  # with the values that it has beside the effect
             return None
         return None if worse(tried.state.misfit, found.final.misfit) else tried
+
+
+def _plainer(further: SearchState, state: SearchState, fault: FaultFit) -> bool:
+    """Whether a further effect beside a ``state`` explains more than a fault, as BIC counts what it has free."""
+    more = len(further.linearisation.parameters) - len(state.linearisation.parameters) - 1
+    return further.misfit.total + more * state.misfit.freedom < fault.misfit.total
 
 
 def together(faults: Sequence[RecordingFault], found: RecordingFault) -> list[RecordingFault]:

@@ -156,6 +156,9 @@ class Search(RecordingFits):
                 for name in added:
                     model = model.without_effect(name)
                 return self.onward(base, model, loose)
+            mended = self.fault_beside(base, path[-1], better) if added else None
+            if mended is not None:
+                return self.onward(base, base.model, mended)
             if better is None:
                 break
             added.append(new_effect(better, path[-1]))
