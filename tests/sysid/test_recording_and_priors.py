@@ -374,3 +374,41 @@ def test_one_segment_of_few_may_be_an_accident_and_is_named() -> None:
     assert aside.time == pytest.approx(segments.first[2] * DT) and aside.seconds == pytest.approx(0.5, rel=0.05)
     assert "of simulated are far off all else, from" in set_aside_sentences([aside])[0]
     assert not accidents(left_out, np.zeros(1, dtype=bool))  # what was found explains it
+
+
+def test_accidents_that_become_many_are_none() -> None:
+    """Left out one by one, all segments in which a limit acts would pass for accidents."""
+    (segments,) = cut([simulated({}, seconds=8.0)], "hydraulic", 0.5)
+    whole = Split([segments], [np.arange(len(segments)) % 3 > 0])
+    far = np.arange(len(segments)) == 2
+    without = whole.judged([segments], [~far])
+    late = replace(without.segments[0].readings[0], delay=1e-4)
+    judged = replace(without.segments[0], readings=(late, *segments.readings[1:]))
+    back = without.judged([judged], [~far[1:]])
+    assert len(back) == len(segments) and not back.far_off
+    assert back.fit[0].tolist() == whole.fit[0].tolist()
+    assert back.segments[0].readings == judged.readings
+    kept = without.judged([judged], [np.ones(len(judged), dtype=bool)])
+    assert len(kept) == len(segments) - 1 and len(kept.far_off[0]) == 1
+
+
+@pytest.mark.parametrize("acts", [[6, 7, 8], [0, 1, 4, 9]])
+def test_what_shows_in_segments_of_one_role_is_shared_out_to_both(acts: list[int]) -> None:
+    (segments,) = cut([simulated({}, seconds=8.0)], "hydraulic", 0.5)
+    fit = ~np.isin(np.arange(len(segments)), [6, 7, 8])
+    squares = np.ones(len(segments))
+    squares[acts] = 20.0
+    (shared,) = Split([segments], [fit]).shared_out([squares]).fit
+    much = squares > 2.0
+    assert 0 < np.count_nonzero(shared[much]) < len(acts)
+    assert (shared[~much] == fit[~much]).all()
+
+
+@pytest.mark.parametrize(("acts", "mixed"), [([4, 5, 6], True), ([], True), ([6, 7, 8], False)])
+def test_roles_stay_where_both_see_what_is_missing_or_records_were_named(acts: list[int], mixed: bool) -> None:
+    (segments,) = cut([simulated({}, seconds=8.0)], "hydraulic", 0.5)
+    fit = ~np.isin(np.arange(len(segments)), [6, 7, 8])
+    squares = np.ones(len(segments))
+    squares[acts] = 20.0
+    split = Split([segments, segments], [fit, fit] if mixed else [np.ones_like(fit), np.zeros_like(fit)])
+    assert split.shared_out([squares, squares]) is split

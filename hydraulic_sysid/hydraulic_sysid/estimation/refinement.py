@@ -77,17 +77,20 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
 
 
 def usable(point: FitPoint, found: Sequence[Segments]) -> list[Mask]:
-    """Which segments are to be judged: (S,) per record; ``found`` are the point's with their outliers."""
-    return but_accidents(_near(point, [s.outliers for s in found]))
+    """Which segments are not far off all others: (S,) per record; ``found`` are the point's with their outliers."""
+    return _near(point, [s.outliers for s in found])
 
 
-def but_accidents(near: Sequence[Mask]) -> list[Mask]:
+def but_accidents(near: Sequence[Mask], before: int = 0) -> list[Mask]:
     """All segments (S,) but the few that are not ``near``, as after a knock on the bench.
 
     Where many are not, something acts there that the model does not have; so it does where all of a record are not.
+
+    :param before: how many were left out before
     """
     every = np.concatenate(near)
-    accident = np.count_nonzero(~every) <= max(1.0, ACCIDENTS * every.size)
+    out = np.count_nonzero(~every) + before
+    accident = out <= max(1.0, ACCIDENTS * (every.size + before))
     return [n if accident and n.any() else np.ones_like(n) for n in near]
 
 

@@ -144,6 +144,7 @@ class Fitting:
 
     def judged(self, state: SearchState) -> SearchState:
         """A state, judged by the noise that it shows itself."""
+        back = False
         for number in range(ROUNDS):
             self.say("noise of the records")
             at, before = state.linearisation, self.split
@@ -151,7 +152,8 @@ class Fitting:
             after = before.judged(segments, usable(at.point, segments))
             # What is far off says little of the noise, however often it is asked.
             far = state.misfit.variance >= FAR_OFF
-            if number and (far or not (quieter(before, after) or retimed(before, after))):
+            back, known = len(after) > len(before), number and not (back or len(after) > len(before))
+            if known and (far or not (quieter(before, after) or retimed(before, after))):
                 break
             self.split = after
             state = self.state(state.model, self._last if state.misfit.variance < FAR_OFF else self._first)

@@ -14,12 +14,13 @@ from math import ceil
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from hydraulic_sim.arrays import Index, Mask
+from hydraulic_sim.arrays import Array, Index, Mask
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.slower import slower
 from hydraulic_sysid.diagnosis.check import resonance
 from hydraulic_sysid.estimation.errors import SegmentError
+from hydraulic_sysid.estimation.refinement import but_accidents
 from hydraulic_sysid.estimation.segments import MEASURED, Segments, cut, spread
 
 from .set_aside import SetAside, set_aside
@@ -30,6 +31,9 @@ MOST_VALUES = 80_000  # measured values of all segments, spread: 27 s of three c
 QUICK_VALUES = 40_000  # … and for an answer in seconds: thirteen; half as many miss every sixth effect
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
+LOPSIDED = 4.0  # times what the values of one role leave beyond the noise, from which the other has seen little of it
+SHOWN = 0.1  # mean square beyond the noise in that role, from which that is no chance
+MUCH = 2.0  # times the median mean square of segments: what leaves more shows what is missing
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,9 @@ class Split:
     set_aside: Sequence[SetAside] = ()
     """What of the records is not judged at all."""
     far_off: Sequence[Segments] = ()
-    """Segments that were left out, since the model was far off in these few alone."""
+    """Segments that were left out, since the model was far off in these few alone, …"""
+    whole: Split | None = None
+    """… and the split before any was."""
 
     @property
     def to_fit(self) -> list[Segments]:
@@ -56,12 +62,51 @@ class Split:
         """Those of which at least a part is fitted, or those that are named for ``validation``."""
         return [s.record for s, f in zip(self.segments, self.fit, strict=True) if bool(f.any()) != validation]
 
-    def judged(self, segments: Sequence[Segments], usable: Sequence[Mask]) -> Split:
-        """The same roles for segments of which more is known, without those that are not ``usable[i]`` (S_i,)."""
+    def judged(self, segments: Sequence[Segments], near: Sequence[Mask]) -> Split:
+        """The same roles for segments of which more is known, without the few that are not ``near[i]`` (S_i,).
+
+        Where they become more than a few, those that were left out before are no accidents either: all are back.
+        """
+        usable = but_accidents(near, sum(len(s) for s in self.far_off))
+        more = all(u.all() for u in usable) and not all(n.all() for n in near)
+        if more and self.whole is not None and not any(s.disturbance.shape[-1] for s in segments):
+            return self.whole.known_from(segments)
         kept = [s.subset(u) for s, u in zip(segments, usable, strict=True)]
         far = [s.subset(~u) for s, u in zip(segments, usable, strict=True) if not u.all()]
         fit = [f[u] for f, u in zip(self.fit, usable, strict=True)]
-        return replace(self, segments=kept, fit=fit, far_off=[*self.far_off, *far])
+        whole = self.whole if self.whole is not None or not far else self
+        return replace(self, segments=kept, fit=fit, far_off=[*self.far_off, *far], whole=whole)
+
+    def known_from(self, judged: Sequence[Segments]) -> Split:
+        """The same segments with the noise and the readings of those that were ``judged``, some of the same records."""
+        both = list(zip(self.segments, judged, strict=True))
+        return replace(self, segments=[replace(s.with_noise(j.noise), readings=j.readings, hum=j.hum) for s, j in both])
+
+    def __len__(self) -> int:
+        return sum(map(len, self.segments))
+
+    def shared_out(self, squares: Sequence[Array]) -> Split:
+        """The same segments, those that leave much in both roles, where nearly all of them were of one.
+
+        What acts at a limit may act in a few segments alone. Records that are wholly of one role, as named, stay so.
+
+        :param squares: (S_i,) mean square over noise of each segment per record
+        """
+        mixed = [bool(f.any() and not f.all()) for f in self.fit]
+        if not any(mixed):
+            return self
+        every, fitted = np.concatenate(list(squares)), np.concatenate(self.fit)
+        beyond = [max(float(np.mean(every[role])) - 1.0, 0.0) for role in (fitted, ~fitted)]
+        if max(beyond) < LOPSIDED * min(beyond) or max(beyond) < SHOWN:
+            return self
+        fit, number = [], 0
+        for own, f, both in zip(squares, self.fit, mixed, strict=True):
+            much = np.flatnonzero(own > MUCH * float(np.median(every))) if both else np.zeros(0, dtype=int)
+            shared = f.copy()
+            shared[much] = (number + np.arange(much.size)) % EVERY != 1
+            number += much.size
+            fit.append(shared)
+        return replace(self, fit=fit)
 
     @property
     def interval(self) -> float:

@@ -76,7 +76,7 @@ class RecordingFits(DataSheetFits):
             base = self.loosened(self.judged(found.state))
         return base if base.scores else self.rounded(base)
 
-    def fault(self, base: SearchState, faults: Sequence[RecordingFault], least: float) -> FaultFit | None:
+    def fault(self, base: SearchState, faults: list[RecordingFault], least: float) -> FaultFit | None:
         """The best of these faults, fitted; None where none is worth it, or promises to explain ``least``."""
         # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
         readings = [f for f in faults if not f.linear]

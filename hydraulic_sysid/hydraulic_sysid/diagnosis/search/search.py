@@ -60,6 +60,11 @@ class Search(RecordingFits):
         """The model, fitted and judged by the noise that it leaves; the data sheet is relaxed where that helps."""
         self.say("fitting the model")
         strict = self.judged(self.state(self.given, self._first))
+        shared = self.split.shared_out([np.mean(r**2, axis=1) for r in strict.residual])
+        if shared is not self.split:
+            self.say("what is missing shows in a few segments: these are shared out anew to be fitted and to validate")
+            self.split = shared
+            strict = self.judged(self.state(strict.model, self._first))
         self.path = [strict]
         self.say.reached((), strict.misfit)
         return self.loosened(strict)
