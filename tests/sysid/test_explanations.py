@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from hostile_page import assert_cannot_inject
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, lfilter
 
 from hydraulic_sim.model import Model
@@ -18,8 +21,11 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose, verdict
 from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, split
+from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError
 from hydraulic_sysid.diagnosis.search.remainder import Spikes
+from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import SearchResult
+from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.report import render
 
 Array = np.ndarray
@@ -172,6 +178,34 @@ def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> Non
     assert "late" in found["verdict"]["text"]
     assert found["residual"]["before"]["validation"] > 1.2 * found["residual"]["after"]["validation"]
     assert_cannot_inject(found)
+
+
+def test_pressures_that_are_a_little_late_beside_an_effect_are_no_further_effect(model: Model) -> None:
+    """The effect hides them at first: what all channels but the position show is then like a slower valve."""
+    runs = driven(model.with_effect("sensor_delay", {"delay": 0.012}))
+    time = DT * np.arange(round(SECONDS / DT))
+    before = np.maximum(time - 0.9 * DT, 0.0)
+    late = [{c: CubicSpline(time, v)(before) if c.startswith("pressure") else v for c, v in run.items()}
+            for run in runs]  # fmt: skip
+    found = document(diagnose(model, records(late)))
+    assert [e["name"] for e in found["effects"] if e["added"]] == ["sensor_delay"], found["verdict"]["text"]
+    assert {f["name"] for f in found["recording"]["faults"]} <= {"pressures", "pressures_low_pass"}
+
+
+def test_what_was_found_is_the_best_so_far_where_the_time_ends_in_what_follows(
+    model: Model, runs, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = Search.of(model, records(runs), [], FitSettings(), lambda _: None)
+    base = search.begin()
+    known = search.state(model.with_effect("sensor_delay", {"delay": 0.01}).with_effect("valve_deadband"))
+    known = replace(known, misfit=replace(known.misfit, validation=2.0 * known.misfit.validation))
+    with monkeypatch.context() as patch:
+        patch.setattr(search, "explore", Mock(side_effect=OutOfTimeError("over")))
+        with pytest.raises(OutOfTimeError):
+            search.forward(base, known)
+    found = search.so_far()
+    assert found.stopped and found.added == ["sensor_delay", "valve_deadband"]
+    assert found.final.model.effects == known.model.effects
 
 
 def test_slow_transducers_are_a_matter_of_the_recording(model: Model, runs) -> None:

@@ -180,4 +180,9 @@ class DataSheetFits(CandidateFits):
 
 def new_effect(state: SearchState, before: SearchState) -> str:
     """The effect that a state has beyond another."""
-    return next(e for e in state.model.effects if e not in before.model.effects)
+    return new_effects(state, before)[0]
+
+
+def new_effects(state: SearchState, before: SearchState) -> list[str]:
+    """All effects that a state has beyond another."""
+    return [e for e in state.model.effects if e not in before.model.effects]

@@ -111,7 +111,10 @@ class RecordingFits(DataSheetFits):
         best = state.misfit.fit if further is None else further.misfit.fit
         readings = [f for f in recording_faults(state.linearisation, disturbances=False) if not f.linear]
         found = self.fault(state, readings, state.misfit.fit - best)
-        if found is None or (further is not None and _plainer(further, state, found)):
+        if found is None:
+            return None
+        sound = not found.fault.unusual(self.split.interval)
+        if further is not None and _plainer(further, state, found, sound):
             return None
         self.assume(found, state, base)
         return self.judged(found.state)
@@ -209,10 +212,14 @@ class RecordingFits(DataSheetFits):
         return None if worse(tried.state.misfit, found.final.misfit) else tried
 
 
-def _plainer(further: SearchState, state: SearchState, fault: FaultFit) -> bool:
-    """Whether a further effect beside a ``state`` explains more than a fault, as BIC counts what it has free."""
+def _plainer(further: SearchState, state: SearchState, fault: FaultFit, sound: bool) -> bool:
+    """Whether a further effect beside a ``state`` explains more than a fault, as BIC counts what it has free.
+
+    It must explain clearly more where ``sound`` sensors have such a fault, too.
+    """
     more = len(further.linearisation.parameters) - len(state.linearisation.parameters) - 1
-    return further.misfit.total + more * state.misfit.freedom < fault.misfit.total
+    needed = more * state.misfit.freedom + (further.misfit.least if sound else 0.0)
+    return further.misfit.total + needed < fault.misfit.total
 
 
 def together(faults: Sequence[RecordingFault], found: RecordingFault) -> list[RecordingFault]:

@@ -22,7 +22,7 @@ from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.refinement import outlying
 
 from .candidate_fits import LATER_REFITS
-from .data_sheet_fits import new_effect
+from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
 from .fitting import FAR_OFF, Task, quieter, retimed, spiked
@@ -102,8 +102,8 @@ class Search(RecordingFits):
             nearest = sorted(refits, key=lambda r: r.misfit.total)[:1]
             better = self.finish(replace(path[-1], refits=nearest), anything)
             path += [better] if better is not None else []
-        names = [new_effect(state, former) for former, state in zip(path, path[1:], strict=False)]
-        misfits = {name: state.misfit for name, state in zip(names, path[1:], strict=True)}
+        steps = zip(path, path[1:], strict=False)
+        misfits = {name: state.misfit for former, state in steps for name in new_effects(state, former)}
         found = SearchResult(self.given, self.split, self.settings, path[0], path[-1], misfits, {}, stopped=True)
         return accidents_named(replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded))
 
@@ -136,11 +136,10 @@ class Search(RecordingFits):
 
     def forward(self, base: SearchState, known: SearchState | None = None) -> SearchResult:
         """Forward from the base or from what is ``known``, backward, and every effect added against its competitors."""
-        path, added = [base], list[str]()
-        self.path = path
-        if known is not None:
-            added = [e for e in known.model.effects if e not in base.model.effects]
-            path.append(self.explore(known, most=LATER_REFITS) if known.misfit.variance - 1.0 > NOTHING_LEFT else known)
+        path = [base] if known is None else [base, known]
+        added, self.path = new_effects(path[-1], base), path
+        if known is not None and known.misfit.variance - 1.0 > NOTHING_LEFT:
+            path[-1] = self.explore(known, most=LATER_REFITS)
         while len(added) < MOST_EFFECTS:
             if added:
                 better = self.finish(path[-1], partial(worth_adding, base, path[-1], added))
