@@ -60,7 +60,7 @@ def study(data: Path, work: Work) -> list[Row]:
             words = ["--model", MODELS / "so101.yaml", "--record", *(folder / n / "control.csv" for n in FIT)]
             words += ["--columns", f"so101_{joint}", "--window", 0, SECONDS, "--segment", SEGMENT]
             work.verb("compare", *words[:-2], into=f"{joint}_compared")
-            found = work.verb("diagnose", *words, "--within", 200, into=f"{joint}_diagnosed")
+            found = work.verb("diagnose", *words, "--within", 300, into=f"{joint}_diagnosed")
             verdict, evidence = said(found)
             named = found["verdict"]["effects"][0] if found["verdict"]["effects"] else None
         before = fitted(bare, fit)
