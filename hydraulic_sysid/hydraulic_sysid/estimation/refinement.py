@@ -76,7 +76,7 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
     return found
 
 
-def usable(point: FitPoint, found: Sequence[Segments]) -> list[Mask]:
+def ordinary(point: FitPoint, found: Sequence[Segments]) -> list[Mask]:
     """Which segments are not far off all others: (S,) per record; ``found`` are the point's with their outliers."""
     return _near(point, [s.outliers for s in found])
 

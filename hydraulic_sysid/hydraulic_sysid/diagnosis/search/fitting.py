@@ -19,7 +19,7 @@ from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import Fit, FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.known_starts import KnownStarts
 from hydraulic_sysid.estimation.parameters import Parameters, bounded
-from hydraulic_sysid.estimation.refinement import refined, usable
+from hydraulic_sysid.estimation.refinement import ordinary, refined
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
 from .agreement import agreed
@@ -149,13 +149,13 @@ class Fitting:
             self.say("noise of the records")
             at, before = state.linearisation, self.split
             segments = refined(at.point, at.columns, self._laws(state.model))
-            after = before.judged(segments, usable(at.point, segments))
+            after = before.judged(segments, ordinary(at.point, segments))
             # What is far off says little of the noise, however often it is asked.
             far = state.misfit.variance >= FAR_OFF
-            back, known = len(after) > len(before), number and not (back or len(after) > len(before))
-            if known and (far or not (quieter(before, after) or retimed(before, after))):
+            more = len(after) > len(before)  # segments that are back are judged once more
+            if number and not (back or more) and (far or not (quieter(before, after) or retimed(before, after))):
                 break
-            self.split = after
+            self.split, back = after, more
             state = self.state(state.model, self._last if state.misfit.variance < FAR_OFF else self._first)
         return state
 
