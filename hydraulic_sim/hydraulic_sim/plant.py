@@ -302,6 +302,12 @@ class Plant:
         """Whether an effect that is on has states of its own, which no sensor sees, or never forgets a drive."""
         return any(e.states or (e.slot == "command" and e.memory and e.reach is None) for e in self._active)
 
+    @property
+    def lasting_memories(self) -> list[int]:
+        """Places in the array of memories of those that may keep what is longer past than `LONGEST_MEMORY` samples."""
+        lasting = [e for e in self._active if e.memory and e.reach is None and not e.slot.endswith("_sensor")]
+        return [k for e in lasting for k in range(self.layout.n_memory)[self.layout.memories[e.name]]]
+
     def driven(self) -> Plant:
         """This plant without all that its `drive_path` has nothing to do with: `track` is faster there."""
         other, inner = copy.copy(self), self._inner_effects
@@ -335,12 +341,15 @@ class Plant:
         keys = ["drive_limit", *(f"{e.name}.{p.name}" for e in inner for p in e.parameters)]
         return (*(e.name for e in inner), *(self.value(k) for k in keys))
 
-    def track(self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike) -> tuple[Array, Array]:
+    def track(
+        self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike, run_up: int | None = None
+    ) -> tuple[Array, Array]:
         """States at each start, those that no sensor sees propagated along the record, the others as measured.
 
         ``drive`` (N,) [V]; ``starts`` (S,) rising sample indices; ``seen`` (N, 4): position, velocity, pressures of
-        A and B as measured, NaN where they were not. Returns the states (S, n_states) and memories (S, n_memory);
-        those of the position's sensor begin anew, as what was measured has passed it.
+        A and B as measured, NaN where they were not; ``run_up``: samples before a start that do, by default all.
+        Returns the states (S, n_states) and memories (S, n_memory); those of the position's sensor begin anew, as
+        what was measured has passed it.
 
         :raises SimulationError: a state stops being finite.
         """
@@ -356,8 +365,9 @@ class Plant:
         x, memory, failure = begin.states.copy(), begin.memory.copy(), np.zeros(2)
         states, memories = np.empty((len(first), x.size)), np.empty((len(first), memory.size))
         done = self._compiled.track(
-            u, dt, self.longest_step, self._turn, measured, self._corrected_every, first, self._on, self._parameters,
-            self._hydraulic, x, memory, states, memories, failure,
+            u, dt, self.longest_step, self._turn, measured, self._corrected_every, first,
+            len(u) if run_up is None else max(run_up, LONGEST_MEMORY), self._on, self._parameters, self._hydraulic, x,
+            memory, states, memories, failure,
         )  # fmt: skip
         if done < len(first):
             sample = min(max(int(failure[0] / dt + 1e-6), 0), len(u) - 1)

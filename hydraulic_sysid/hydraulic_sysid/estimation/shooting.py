@@ -11,7 +11,7 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
-from hydraulic_sim.plant import Plant
+from hydraulic_sim.plant import LONGEST_MEMORY, Plant
 
 from .parallel import results
 from .parameters import Parameters
@@ -20,6 +20,9 @@ from .segments import Segments
 
 T = TypeVar("T")
 
+_SAME = 1e-3  # of what a state ranges over: propagated alike
+_NUDGE, _AMPLIFIED = 1e-6, 1e-4  # of the mass, and of what a state ranges over: what that changes so much, none follows
+_WORTH = 0.7  # of a record, beyond which a run-up to each segment saves nothing
 _MOST_KNOWN = 256  # propagations along a record that are kept
 _STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
 _STEP = 2e-3  # difference step of a parameter, of its value, …
@@ -72,6 +75,10 @@ class Shooting:
     @cached_property
     def _known(self) -> dict[tuple[int, tuple[float | str, ...]], tuple[Array, Array]]:
         """What was propagated along a record, by record and path: most plants of a fit share it."""
+        return {}
+
+    @cached_property
+    def _run_ups(self) -> dict[tuple[int, tuple[str, ...]], int | None]:
         return {}
 
     @cached_property
@@ -218,23 +225,65 @@ class Shooting:
             measured = segments.smoothed.shape[1]
             columns = [k for k, name in enumerate(plant.state_names) if k >= measured and name != "stick"]
             path = plant.drive_path
-            found = Inner(columns, *self._track(plant if path is None else plant.driven(), i, path or plant.path))
+            tracked = plant if path is None else plant.driven()
+            found = Inner(columns, *self._track(tracked, i, path or plant.path, columns))
         if segments.tracked:
             # The piston moves as it was seen to, whatever its forces.
-            values, _ = self._track(plant.held(), i, ("held", *plant.held_path))
+            values, _ = self._track(plant.held(), i, ("held", *plant.held_path), segments.tracked)
             found = replace(found, pressures=(segments.tracked, values))
         return found
 
-    def _track(self, plant: Plant, i: int, path: tuple[float | str, ...]) -> tuple[Array, Array]:
-        """States and memories at each segment; those of another plant of the same ``path``, where there was one."""
+    def _track(
+        self, plant: Plant, i: int, path: tuple[float | str, ...], columns: list[int]
+    ) -> tuple[Array, Array]:
+        """States and memories at each segment; those of another plant of the same ``path``, where there was one.
+
+        Only these ``columns`` of the states are of use.
+        """
         known = self._known.get((i, path))
         if known is None:
             if len(self._known) > _MOST_KNOWN:
                 self._known.clear()
-            segments = self.segments[i]
-            known = plant.track(segments.drive, segments.record.dt, segments.first, segments.smoothed)
+            known = self._propagated(plant, i, self._run_up(plant, i, path, columns))
             self._known[i, path] = known
         return known
+
+    def _propagated(self, plant: Plant, i: int, run_up: int | None) -> tuple[Array, Array]:
+        segments = self.segments[i]
+        return plant.track(segments.drive, segments.record.dt, segments.first, segments.smoothed, run_up)
+
+    def _run_up(self, plant: Plant, i: int, path: tuple[float | str, ...], columns: list[int]) -> int | None:
+        """Samples before each segment after which such a plant has forgotten what it began with; None: it never does.
+
+        That is tried on the first one with the same effects.
+        """
+        key = i, tuple(part for part in path if isinstance(part, str))
+        if key not in self._run_ups:
+            self._run_ups[key] = self._shortest_run_up(plant, i, columns)
+        return self._run_ups[key]
+
+    def _shortest_run_up(self, plant: Plant, i: int, columns: list[int]) -> int | None:
+        first = self.segments[i].first
+        gaps, samples = np.diff(first, prepend=0), LONGEST_MEMORY
+
+        def compared(plant: Plant, run_up: int | None) -> Array:
+            states, memories = self._propagated(plant, i, run_up)
+            return np.concatenate((states[:, columns], memories[:, plant.lasting_memories]), axis=1)
+
+        def saves() -> bool:
+            return bool(np.minimum(gaps, samples).sum() < _WORTH * first[-1])
+
+        if not saves():
+            return None
+        whole = compared(plant, None)
+        ranges = np.ptp(whole, axis=0)
+        nudged = plant.with_parameters({"moving_mass": (1.0 + _NUDGE) * plant.value("moving_mass")})
+        followed = np.all(np.abs(compared(nudged, None) - whole) <= _AMPLIFIED * ranges, axis=1)
+        while saves():
+            if np.all((np.abs(compared(plant, samples) - whole) <= _SAME * ranges)[followed]):
+                return samples
+            samples *= 2
+        return None
 
     def _beside(self, plant: Plant, i: int) -> Plant:
         """The plant with what record ``i`` states of the machine."""
