@@ -412,12 +412,3 @@ def test_roles_stay_where_both_see_what_is_missing_or_records_were_named(acts: l
     squares[acts] = 20.0
     split = Split([segments, segments], [fit, fit] if mixed else [np.ones_like(fit), np.zeros_like(fit)])
     assert split.shared_out([squares, squares]) is split
-
-
-def test_what_promises_nothing_is_not_tried() -> None:
-    """At a minimum every further step would fail, however much it were damped."""
-    y = 1.0 + 1e-3 * np.random.default_rng(4).standard_normal(50)
-    there = minimise(Bend(Parameters.unbounded(np.array([1.2])), y), 50, 1e-12).point
-    before = Bend.steps
-    again = minimise(there, 50, 1e-6)
-    assert again.converged and Bend.steps == before

@@ -21,8 +21,6 @@ from .parameters import Parameters
 
 _FOLLOWED = (0.7, 1.4)  # gain of a step over the predicted one, within which derivatives are carried on to the next
 LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-6, 1e-3, 1e4
-_FELT_DAMPING = 1e-2  # less leaves a step much as it was: what comes after one that failed
-_PROMISED = 0.1  # of the least gain, which a step must promise to be tried: far from linear it may give more
 _UPHILL = 1.0  # standard errors from the optimum at which it is no failure that no step gets any lower
 
 
@@ -118,11 +116,10 @@ def minimise(
 ) -> Minimum[P]:
     """The minimum near ``point``.
 
-    It is found when a step lowers the cost by less than ``least_gain`` of it, or promises far less, or when the next
-    step would be shorter than ``tolerance`` standard errors. ``accepted`` sees every step and may hand back another
-    point (whose residuals are weighed otherwise) to go on from. Where a step gained what was predicted the point may
-    have derived its normal equations from those before; no fit ends by such alone, and steps from there are not
-    counted.
+    It is found when a step lowers the cost by less than ``least_gain`` of it, or when the next step would be shorter
+    than ``tolerance`` standard errors. ``accepted`` sees every step and may hand back another point (whose residuals
+    are weighed otherwise) to go on from. Where a step gained what was predicted the point may have derived its normal
+    equations from those before; no fit ends by such alone, and steps from there are not counted.
     """
     damping, number = _FIRST_DAMPING, 0
     while number < most_steps or not point.exact:
@@ -131,17 +128,16 @@ def minimise(
         if normal is None:
             return Minimum(point, False, number - 1)
         better: P | None = None
-        change = bounded_step(normal, point.parameters, damping)
-        worth = _PROMISED * least_gain * point.cost if point.exact else -np.inf
-        while better is None and damping <= _MOST_DAMPING and normal.reduction(change) > worth:
+        change = normal.gradient
+        while better is None and damping <= _MOST_DAMPING:
+            change = bounded_step(normal, point.parameters, damping)
             tried = point.moved(change)
             if tried is not None and tried.cost < point.cost:
                 better = _as(point, tried)
             elif not point.exact:
                 break
             else:
-                damping = max(damping * 8.0, _FELT_DAMPING)
-                change = bounded_step(normal, point.parameters, damping)
+                damping *= 8.0
         if better is None:
             if not point.exact:
                 point = _as(point, point.made_exact())

@@ -47,18 +47,10 @@ class Refit:
 def refit(at: Linearisation, model: Model, start: Mapping[str, float]) -> Refit:
     """Fit ``model``, which has the linearisation's effects and more, from its values and ``start`` [SI, by key]."""
     own = tuple(k for k in start if model.entry(k).free)
-    begin = _begin(at.to_fit, model, start, own)
+    begin = _begin(at, model, start, own)
     if begin is None:
         return Refit(model, at.costs)
-    found = minimise(begin, _MOST_STEPS, _FLAT).point
-    new = iter(found.initial_states)
-    states = [s.copy() for s in at.point.initial_states]
-    for own_states, chosen in zip(states, at.split.fit, strict=True):
-        if chosen.any():
-            own_states[chosen] = next(new)
-    point = FrozenPoint.at(at, found.plant, found.parameters, states)
-    if point is None:  # it does not run through what is to validate
-        return Refit(model, at.costs)
+    point = minimise(begin, _MOST_STEPS, _FLAT).point
     values = {**start, **point.parameters.by_key}
     return Refit(model.with_values(values, source="fitted"), point.at_rest(_ROUNDS).costs)
 

@@ -14,7 +14,6 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.known_starts import KnownStarts
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
-from hydraulic_sysid.estimation.parallel import lazy
 from hydraulic_sysid.estimation.parameters import NO_PRIORS, Parameters, Priors
 
 from .holdout import Split
@@ -117,11 +116,6 @@ class Linearisation:
             chosen.append(keep)
         return self._subset(chosen), sum(int(c.sum()) for c in chosen) / max(total, 1)
 
-    @lazy
-    def to_fit(self) -> Linearisation:
-        """The same on the segments for fitting alone."""
-        return self._subset(self.split.fit)
-
     def of_one_record(self) -> Linearisation:
         """The same on the segments for fitting of the record that leaves most."""
         left = [float(np.sum(c[f])) for c, f in zip(self.costs, self.split.fit, strict=True)]
@@ -136,8 +130,6 @@ class Linearisation:
         point = self.point.subset(chosen)
         split = Split(list(point.shooting.segments), [np.ones(len(s), dtype=bool) for s in point.shooting.segments])
         beyond = [b[c] for b, c in zip(self.beyond, chosen, strict=True) if c.any()]
-        if self.known is None:  # there are columns
-            point = replace(point, derived=[own[c] for own, c in zip(self.columns, chosen, strict=True) if c.any()])
         return Linearisation(self.model, split, point, beyond)
 
     def _inner(self, left: Sequence[Array], right: Sequence[Array]) -> Array:
