@@ -265,15 +265,15 @@ def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memorie
 
 @njit("i8(f8[::1], f8, f8, f8, f8[:, ::1], i8, i8[::1], i8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1],"
       " f8[:, ::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
-def track(drive, dt, max_step, max_turn, seen, every, starts, ahead_of, on, P, hydraulic, X, M, states, memories,
+def track(drive, dt, max_step, max_turn, seen, every, starts, run_up, on, P, hydraulic, X, M, states, memories,
           failure):
     """Runs along ``drive``, set every so many samples to what is seen of the first states; keeps X and M at starts.
 
-    What lies further than ``ahead_of`` samples before a start, behind the one before, is left out."""
+    What lies more than ``run_up`` samples before a start, and after the one before, is left out."""
     Y = np.empty((every, 10))
     k = 0
     for i in range(len(starts)):
-        k += max(starts[i] - ahead_of - k, 0) // every * every
+        k += max(starts[i] - run_up - k, 0) // every * every
         while True:
             for j in range(seen.shape[1]):
                 if seen[k, j] == seen[k, j]:

@@ -300,7 +300,7 @@ class Plant:
     @property
     def has_inner_states(self) -> bool:
         """Whether an effect that is on has states of its own, which no sensor sees, or never forgets a drive."""
-        return any(e.states or (e.slot == "command" and e.memory and e.reach is None) for e in self._active)
+        return any(e.states for e in self._active) or bool(self.lasting_memories)
 
     @property
     def lasting_memories(self) -> list[int]:
@@ -347,9 +347,9 @@ class Plant:
         """States at each start, those that no sensor sees propagated along the record, the others as measured.
 
         ``drive`` (N,) [V]; ``starts`` (S,) rising sample indices; ``seen`` (N, 4): position, velocity, pressures of
-        A and B as measured, NaN where they were not; ``run_up``: samples before a start that do, by default all.
-        Returns the states (S, n_states) and memories (S, n_memory); those of the position's sensor begin anew, as
-        what was measured has passed it.
+        A and B as measured, NaN where they were not; ``run_up``: samples before a start that do, by default all, at
+        least `LONGEST_MEMORY`. Returns the states (S, n_states) and memories (S, n_memory); those of the position's
+        sensor begin anew, as what was measured has passed it.
 
         :raises SimulationError: a state stops being finite.
         """

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
@@ -167,3 +169,34 @@ def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(
     assert len(shooting.try_out(soft, shooting.initial_states)) == 1
     with pytest.raises(SimulationError, match="asks for steps of"):
         shooting.try_out(stiff, shooting.initial_states)
+
+
+@pytest.mark.parametrize(
+    ("effect", "forgets"),
+    [("spool_dynamics", True), ("supply_droop", True), ("structural_flexibility", True), ("valve_hysteresis", False)],
+)
+def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
+    model: Model, effect: str, forgets: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two segments far apart, each long after a burst that leaves the valve's play on the other side."""
+    plant = Plant.for_fits(model.with_effect(effect, {} if forgets else {"half_width": 0.2}))
+    time = DT * np.arange(40_000)
+    burst = np.where(time < 20.0, 8.0, -8.0) * np.sin(2.0 * np.pi * 2.0 * time)
+    drive = np.where(time % 20.0 < 1.0, burst, np.sin(2.0 * np.pi * time))
+    run = plant.simulate(drive, DT)
+    apart = cut([Record.sampled("apart", DT, {"drive": drive, **{c: run[c] for c in NOISE}})], "hydraulic", 0.5)[0]
+    apart = apart.subset(np.isin(np.arange(len(apart)), (24, 72)))
+    run_ups, track = [], Plant.track
+
+    def tracked(self: Plant, *arguments: Any) -> tuple[Array, Array]:
+        run_ups.append(arguments[4])
+        return track(self, *arguments)
+
+    monkeypatch.setattr(Plant, "track", tracked)
+    shooting = Shooting(plant, [apart])
+    states = shooting.initial_states
+    short = shooting.simulated(plant, states)[0]
+    assert (run_ups[-1] is not None) == forgets
+    monkeypatch.setattr(Shooting, "_shortest_run_up", lambda *_: None)
+    whole = Shooting(plant, [apart]).simulated(plant, states)[0]
+    assert np.all(np.abs(short - whole) <= 1e-3 * np.ptp(whole, axis=(0, 1)))

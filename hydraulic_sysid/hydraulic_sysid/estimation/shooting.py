@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array
+from hydraulic_sim.arrays import Array, Mask
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import LONGEST_MEMORY, Plant
 
@@ -20,9 +20,10 @@ from .segments import Segments
 
 T = TypeVar("T")
 
-_SAME = 1e-3  # of what a state ranges over: propagated alike
-_NUDGE, _AMPLIFIED = 1e-6, 1e-4  # of the mass, and of what a state ranges over: what that changes so much, none follows
-_WORTH = 0.7  # of a record, beyond which a run-up to each segment saves nothing
+_SAME = 1e-3  # of the range of a state: off by less after a run-up, it is as from the beginning
+_NUDGE = 1e-6  # of the mass; where it changes a state by …
+_AMPLIFIED = 1e-4  # … that much of its range, no propagation says where the state is (a load that rattles in a gap)
+_WORTH = 0.7  # of a record, beyond which run-ups to its segments save nothing
 _MOST_KNOWN = 256  # propagations along a record that are kept
 _STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
 _STEP = 2e-3  # difference step of a parameter, of its value, …
@@ -253,9 +254,9 @@ class Shooting:
         return plant.track(segments.drive, segments.record.dt, segments.first, segments.smoothed, run_up)
 
     def _run_up(self, plant: Plant, i: int, path: tuple[float | str, ...], columns: list[int]) -> int | None:
-        """Samples before each segment after which such a plant has forgotten what it began with; None: it never does.
+        """Samples before each segment from which on such a plant is propagated; None: from the beginning.
 
-        That is tried on the first one with the same effects.
+        It is what `_shortest_run_up` finds for the first plant with the same effects.
         """
         key = i, tuple(part for part in path if isinstance(part, str))
         if key not in self._run_ups:
@@ -263,10 +264,14 @@ class Shooting:
         return self._run_ups[key]
 
     def _shortest_run_up(self, plant: Plant, i: int, columns: list[int]) -> int | None:
+        """Samples after which a plant has forgotten what it began with; None where that takes most of the record.
+
+        Tried are `LONGEST_MEMORY` and its doubles.
+        """
         first = self.segments[i].first
         gaps, samples = np.diff(first, prepend=0), LONGEST_MEMORY
 
-        def compared(plant: Plant, run_up: int | None) -> Array:
+        def propagated(plant: Plant, run_up: int | None) -> Array:
             states, memories = self._propagated(plant, i, run_up)
             return np.concatenate((states[:, columns], memories[:, plant.lasting_memories]), axis=1)
 
@@ -275,12 +280,15 @@ class Shooting:
 
         if not saves():
             return None
-        whole = compared(plant, None)
+        whole = propagated(plant, None)
         ranges = np.ptp(whole, axis=0)
-        nudged = plant.with_parameters({"moving_mass": (1.0 + _NUDGE) * plant.value("moving_mass")})
-        followed = np.all(np.abs(compared(nudged, None) - whole) <= _AMPLIFIED * ranges, axis=1)
+        vague: Mask | None = None
         while saves():
-            if np.all((np.abs(compared(plant, samples) - whole) <= _SAME * ranges)[followed]):
+            off = np.any(np.abs(propagated(plant, samples) - whole) > _SAME * ranges, axis=1)
+            if off.any() and vague is None:
+                nudged = plant.with_parameters({"moving_mass": (1.0 + _NUDGE) * plant.value("moving_mass")})
+                vague = np.any(np.abs(propagated(nudged, None) - whole) > _AMPLIFIED * ranges, axis=1)
+            if vague is None or not np.any(off & ~vague):
                 return samples
             samples *= 2
         return None
