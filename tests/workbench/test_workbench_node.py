@@ -81,6 +81,11 @@ class Page:
         await self.post("experiments/start", plan=PLAN, rehearsal=job)
 
 
+def stamp(state: Any) -> int:
+    """When the plant was in `state`, ns."""
+    return int(state.header.stamp.sec * 10**9 + state.header.stamp.nanosec)
+
+
 @pytest.fixture
 def bench(launch: Any, client: Any, compiled_physics: None, tmp_path: Path) -> Any:
     """A plant that somebody else runs, and a workbench that is attached to it."""
@@ -124,10 +129,13 @@ def test_whatever_becomes_of_page_and_server_the_plant_is_safe(bench: Any, clien
             await page.until(lambda: page.state["plant"]["stopped"], "the latch")
             await page.until(lambda: page.state["experiment"]["phase"] == "aborted", "the end of the experiment")
             assert page.state["experiment"]["record"], "what was recorded until then is kept"
-            assert (await page.post("plant/reset"))["ok"] and (await page.post("plant/enable", on=True))["ok"]
+            assert (await page.post("plant/reset"))["ok"]
+            enabled = time.time_ns()
+            assert (await page.post("plant/enable", on=True))["ok"]
             await page.until(lambda: page.state["plant"]["enabled"], "enabled again")
-            await asyncio.sleep(0.3)
-            assert drive() == 0.0, "nothing starts again by itself"
+            await page.until(lambda: stamp(states[-1]) > enabled + 300_000_000, "0.3 s of states after it")
+            moving = [s.effort[1] for s in states if stamp(s) > enabled and s.effort[1] != 0.0]
+            assert not moving, f"nothing starts again by itself: {moving[:3]} V in {len(moving)} states"
             await page.start_experiment()
             await page.until(lambda: abs(drive()) > 0.2, "the excitation")
         await frozen.close()  # all pages are closed, in the middle of the experiment
@@ -169,7 +177,7 @@ def test_the_stop_button_gives_0_v_within_50_ms(bench: Any, client: Any, wait_un
                 assert (await page.stop())["ok"]
                 await page.until(lambda: states[-1].effort[1] == 0.0, "0 V", 5.0)
                 first = next(s for s in states[number:] if s.effort[1] == 0.0)
-                found.append((first.header.stamp.sec * 10**9 + first.header.stamp.nanosec - pressed) * 1e-6)
+                found.append((stamp(first) - pressed) * 1e-6)
         return found
 
     try:
