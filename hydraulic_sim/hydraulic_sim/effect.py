@@ -32,7 +32,8 @@ class Parameter:
     has no such value of its own. ``free`` says whether a fit may move it unless a model file says otherwise.
     ``required`` marks a base parameter for which no default is sensible: a model file must give it. ``nuisance``
     marks one that only smooths a law where it has a corner: no data sheet states it, a diagnosis fits it too.
-    ``observed`` names what of a record shows the value by itself: "resolution", the step between position readings.
+    ``observed`` names what of a record shows the value by itself: "resolution", the step between position readings,
+    "blur", how much noise there is before they are rounded to it.
     """
 
     name: str

@@ -599,6 +599,15 @@ def test_quantisation_rounds_to_the_nearest_step(free: Build, step: float) -> No
         assert np.max(np.abs(run.position - run.true_position)) <= 0.5 * step * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("noise", [0.05, 0.2, 0.5, 0.9])
+def test_a_noisy_reading_in_steps_is_the_mean_of_many(free: Build, noise: float) -> None:
+    step = 1e-3
+    run = coast(free(sensor_quantisation={"step": step, "noise": noise * step}), 0.02)
+    added = np.random.default_rng(1).normal(scale=noise * step, size=(20000, 1))
+    mean = (step * np.round((run.true_position[:25] + added) / step)).mean(axis=0)
+    assert np.abs(run.position[:25] - mean).max() < 5.0 * step * (0.5 + noise) / math.sqrt(20000)
+
+
 def test_pressure_offsets_are_read_but_not_felt(hydraulic: Build) -> None:
     drive = noise(200)
     plain = hydraulic().simulate(drive, DT)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hydraulic_sysid.diagnosis.search.agreement import AGREED, agreed, agreement
+from hydraulic_sysid.diagnosis.search.agreement import AGREED, CONFIRMED, agreed, agreement
 
 SEGMENTS, SAMPLES = 90, 400
 FIT = np.arange(SEGMENTS) % 3 != 2
@@ -51,3 +51,12 @@ def test_what_only_fits_the_fitted_segments_is_chance() -> None:
     after[FIT] *= 0.9
     after[~FIT] *= 1.1
     assert not agreed([noise], [after], [FIT])
+
+
+def test_what_was_not_chosen_need_not_stand_out_among_many() -> None:
+    noise, shape = white(7), np.sin(0.1 * np.arange(SAMPLES)) * np.ones((SEGMENTS, 1))
+    change = 0.07 * shape
+    own, size = np.sum(change * (noise + change), axis=1), np.sum(change**2, axis=1)
+    assert 2.0 * CONFIRMED < agreement(own[FIT], size[FIT]) < AGREED
+    assert not agreed([noise + change], [noise], [FIT])
+    assert agreed([noise + change], [noise], [FIT], found=False)

@@ -486,10 +486,12 @@ def test_later_refits_are_not_all_of_one_subsystem(model) -> None:
 
 def test_an_observed_parameter_is_tried_at_what_was_seen_alone(model) -> None:
     quantised = model.library["sensor_quantisation"]
-    assert [g[0].values for g in probes(quantised, RecordFeatures(resolution=3e-4))] == [
-        {"sensor_quantisation.step": 3e-4}
-    ]
+    tried = [probe.values for (probe,) in probes(quantised, RecordFeatures(resolution=3e-4))]
+    assert {values["sensor_quantisation.step"] for values in tried} == {3e-4}
+    noise = [values["sensor_quantisation.noise"] for values in tried]
+    assert noise[0] == 0.0 and noise == sorted(set(noise)) and noise[-1] < 3e-4
     assert list(probes(quantised, RecordFeatures())) == []
+    assert list(probes(quantised, RecordFeatures(resolution=0.5))) == [], "beyond what the effect allows"
 
 
 def test_half_the_influence_of_a_frequency_is_twice_the_frequency() -> None:

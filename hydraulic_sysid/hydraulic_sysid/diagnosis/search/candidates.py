@@ -26,6 +26,7 @@ FREQUENCIES = (1.0, 0.5, 0.25, 0.125, 2.0, 4.0)  # of the default at which a res
 WIDE = 8.0  # … so many times as much damped: that of a light damping shows at its own frequency alone
 ANGLE = "rad"
 WITHIN = 0.4  # of the stroke: lengths that are tried are no longer
+BLURS = (0.0, 0.06, 0.12, 0.2, 0.3)  # of a resolution: noise before readings are rounded to it
 QUARTERS = tuple(0.5 * math.pi * i for i in range(4))  # angles that are tried
 
 
@@ -96,10 +97,7 @@ def probes(effect: Effect, features: RecordFeatures, sizes: Sequence[float] = SI
     ``sizes``: how far, of the default; further ones than the first are for the default shape alone.
     """
     if observed(effect):
-        for p in effect.parameters:
-            if p.observed == "resolution" and p.null is not None and p.bounds[0] < features.resolution <= p.bounds[1]:
-                key = f"{effect.name}.{p.name}"
-                yield [Probe({key: features.resolution}, key, p.null)]
+        yield from _as_seen(effect, features)
         return
     shape = [p for p in effect.parameters if p.null is None and p.unit != ANGLE]
     angles = [p for p in effect.parameters if p.null is None and p.unit == ANGLE]
@@ -113,6 +111,19 @@ def probes(effect: Effect, features: RecordFeatures, sizes: Sequence[float] = SI
         given = {f"{effect.name}.{p.name}": v for p, v in zip([*shape, *angles], [*values, *turned], strict=True)}
         for size in sizes if values == first else sizes[:1]:
             yield [_probe(effect, given, p, size) for p in moved]
+
+
+def _as_seen(effect: Effect, features: RecordFeatures) -> Iterator[list[Probe]]:
+    """What is observed, as the records show it; nothing where they do not, or nothing that the effect allows."""
+    shown = [p for p in effect.parameters if p.observed]
+    moved = next(p for p in shown if p.null is not None)
+    seen = {"resolution": (features.resolution,), "blur": tuple(b * features.resolution for b in BLURS)}
+    for values in itertools.product(*(seen[f"{p.observed}"] for p in shown)):
+        given = {f"{effect.name}.{p.name}": v for p, v in zip(shown, values, strict=True)}
+        within = all(p.bounds[0] <= v <= p.bounds[1] for p, v in zip(shown, values, strict=True))
+        null, key = moved.null or 0.0, f"{effect.name}.{moved.name}"
+        if within and given[key] != null:
+            yield [Probe(given, key, null)]
 
 
 def inverse(null: float, default: float) -> bool:

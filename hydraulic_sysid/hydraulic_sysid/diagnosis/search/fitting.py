@@ -164,10 +164,14 @@ class Fitting:
         return [k for k in model.free_keys() if "." in k or self.given.entry(k).free]
 
     def better(self, before: SearchState, after: SearchState) -> bool:
-        """Whether what a state explains more than another is more than chance; where little is left, by any noise."""
+        """Whether what a state explains more than another is more than chance; where little is left, by any noise.
+
+        What the records show by themselves was not found among many.
+        """
         if not material(before.misfit, after.misfit):
             return False
-        return not before.misfit.little or agreed(before.residual, after.residual, self.split.fit)
+        found = without_derivative(after.model) == without_derivative(before.model)
+        return not before.misfit.little or agreed(before.residual, after.residual, self.split.fit, found)
 
     def nearer(self, model: Model, far: bool) -> SearchState:
         """A model fitted: where it is ``far`` off, to the end only if it comes near.
