@@ -58,6 +58,7 @@ def test_a_segment_that_is_held_by_dry_friction_does_not_ring(model: Model, monk
     held = worst(FitPoint.begin(Plant.for_fits(model), rests(model, quiet=0.1), ()).at_rest())
     segments = rests(model, quiet=0.1)
     monkeypatch.setattr(Segments, "turning", lambda s, _: np.full(len(s), np.nan))
+    monkeypatch.setattr(Segments, "_bent", lambda s, _: np.clip(s.smoothed[s.first, 1] / STICK_SPEED, -1.0, 1.0))
     ringing = worst(FitPoint.begin(Plant.for_fits(model), segments, ()).at_rest())
     assert ringing > 3.0
     assert held < 1.5
@@ -76,6 +77,23 @@ def test_a_creeping_piston_has_its_dry_friction_in_full(model: Model, volts: flo
     assert 0.0 < np.abs(run["velocity"][s.first[late]]).max() < STICK_SPEED
     assert np.isnan(s.turning(plant)[late]).all() == known
     assert (stick[late] == np.sign(volts)).all() == known
+
+
+def test_long_bristles_bend_by_the_way_gone_since_the_piston_turned(model: Model) -> None:
+    long = model.with_effect("presliding", {"length": 2e-3})
+    plant = Plant(long)
+    assert (plant.bristle_length, Plant(model).bristle_length) == (2e-3, model.value("bristle_length"))
+    time = DT * np.arange(round(SECONDS / DT))
+    drive = 0.4 * np.sin(2.0 * np.pi * 0.7 * time)
+    run, draw = plant.simulate(drive, DT), np.random.default_rng(1)
+    channels = {c: run[c] + std * draw.standard_normal(time.size) for c, std in NOISE.items()}
+    (s,) = cut([Record.sampled("slow", DT, {"drive": drive, **channels})], "hydraulic", 0.3)
+    column = plant.state_names.index("stick")
+    true = np.array([plant.simulate(drive[:first], DT).final.states[column] for first in s.first[1:]])
+    moving = np.abs(s.smoothed[s.first[1:], 1]) > STICK_SPEED
+    turning = moving & (np.abs(true) < 0.8)
+    assert turning.sum() > 5, "of these the direction would not do"
+    assert np.abs(s.initial_states(plant)[1:, column] - true)[moving].max() < 0.1
 
 
 def test_without_dry_friction_nothing_is_held(model: Model, segments: list[Segments]) -> None:

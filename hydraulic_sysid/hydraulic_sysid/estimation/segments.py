@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.signal import find_peaks, savgol_filter
 
 from hydraulic_sim import rates
 from hydraulic_sim.arrays import Array, Index, Mask
@@ -216,8 +216,7 @@ class Segments:
                 states[:, column] = np.where(np.isfinite(begin[:, column]), begin[:, column], 0.0)
             elif name == "stick":
                 slid = self._slid(plant)
-                partly = np.clip(begin[:, _STATES.index("velocity")] / STICK_SPEED, -1.0, 1.0)
-                states[:, column] = np.where(slid != 0.0, slid, partly)
+                states[:, column] = np.where(slid != 0.0, slid, self._bent(plant))
             elif plant.layout.state_records[name].initial == "command":
                 states[:, column] = command[np.maximum(self.first - 1, 0)]
         return states
@@ -249,13 +248,40 @@ class Segments:
         """
         if plant.model.kind != "hydraulic":
             return np.zeros(len(self))
-        length = plant.value("bristle_length")
+        length = plant.bristle_length
         position, channel = self.smoothed[:, _STATES.index("position")], self.channels.index("position")
         half = max(1, round(0.5 * _SLIDING / self.record.dt))
         before, after = np.maximum(self.first - half, 0), np.minimum(self.first + half, len(position) - 1)
         ways = np.stack([position[self.first] - position[before], position[after] - position[self.first]])
         far = 0.5 * max(_SLID * length, _SEEN * float(self.noise_std[channel]))
         return np.where((ways > far).all(axis=0), 1.0, np.where((ways < -far).all(axis=0), -1.0, 0.0))
+
+    def _bent(self, plant: Plant) -> Array:
+        """(S,) how far the bristles are bent: in full above `STICK_SPEED`, in proportion below.
+
+        Those that are longer than what the noise of the position hides, by the way gone since the piston last turned.
+        """
+        length = plant.bristle_length
+        position, velocity = (self.smoothed[self.first, _STATES.index(name)] for name in ("position", "velocity"))
+        if length < float(self.noise_std[self.channels.index("position")]):
+            return np.clip(velocity / STICK_SPEED, -1.0, 1.0)
+        bent, before = np.zeros(len(self._turns)), np.searchsorted(self._turns, self.first, side="right") - 1
+        turned = self.smoothed[self._turns, _STATES.index("position")]
+
+        def after(bent: Array, way: Array) -> Array:
+            return np.sign(way) + (bent - np.sign(way)) * np.exp(-np.abs(way) / length)
+
+        for i, way in enumerate(np.diff(turned)):
+            bent[i + 1] = after(bent[i], way)
+        return after(bent[before], position - turned[before])
+
+    @cached_property
+    def _turns(self) -> Index:
+        """Samples at which the piston turns by more than the noise, the first of the record among them."""
+        position = self.smoothed[:, _STATES.index("position")]
+        seen = _SEEN * float(self.noise_std[self.channels.index("position")])
+        peaks = [find_peaks(way * position, prominence=seen)[0] for way in (1.0, -1.0)]
+        return np.unique(np.concatenate(([0], *peaks)))
 
     @cached_property
     def _turning(self) -> Array:
