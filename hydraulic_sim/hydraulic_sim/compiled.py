@@ -11,7 +11,7 @@ from types import ModuleType
 
 from hydraulic_node_utils import generated_code
 
-from . import kernels
+from . import embedded, kernels
 from .compose import Layout, write_module
 from .errors import EffectError
 from .registry import Library
@@ -30,7 +30,8 @@ class CompiledPlant:
 
 
 def _load(library: Library) -> ModuleType:
-    rests_on = (library.fingerprint, *(Path(f).read_text(encoding="utf-8") for f in (kernels.__file__, __file__)))
+    files = kernels.__file__, embedded.__file__, __file__
+    rests_on = (library.fingerprint, *(Path(f).read_text(encoding="utf-8") for f in files))
     functions = {
         f"{effect.name}.{which}": function
         for effect in library.values()

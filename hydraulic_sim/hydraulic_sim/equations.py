@@ -80,6 +80,7 @@ MODULE = '''
 import math
 import numpy as np
 from numba import njit
+from hydraulic_sim.embedded import RUN
 from hydraulic_sim.kernels import clamp, smooth_root_gain
 
 {functions}
@@ -107,8 +108,7 @@ def rhs(now, S, command, on, P, hydraulic, K, R, G, AUX):
     AUX[9] = direction; AUX[10] = pressure_tank
 
 
-@njit("i8(f8[::1], f8, f8, f8, f8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1], f8[::1])",
-      cache=True, nogil=True, error_model="numpy")
+@njit(RUN, cache=True, nogil=True, error_model="numpy")
 def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
     """Integrates X over len(drive) samples; Y[k] is what is seen at sample k. Returns the samples done.
 

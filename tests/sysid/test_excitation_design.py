@@ -11,6 +11,8 @@ import pytest
 from hostile_page import assert_cannot_inject
 
 from hydraulic_node_utils.cli import run_verb
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.live import LivePlant
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.excitation import ExcitationError, ExcitationRun, Phase, Plan, load_plan
@@ -108,6 +110,32 @@ def test_a_simulated_run_is_the_plant_under_the_drive_that_it_records(model) -> 
     np.testing.assert_allclose(again.position, played.record["position"], atol=1e-9)
     assert played.extremes.position_max == pytest.approx(again.position.max(), abs=1e-9)
     assert not played.aborted
+
+
+@pytest.mark.parametrize("limit", [1.0, 0.002], ids=["to its end", "broken off"])
+def test_a_rehearsal_is_what_a_run_does_state_by_state(model, limit: float) -> None:  # noqa: ANN001
+    """With an approach, centring and a coarse sensor; the plant goes on from each drive as it does on the bench."""
+    plan = replace(propose("sine", Wish(1.0, 4.0, 4.0)), travel_limit=limit, centring_gain=30.0, centring_limit=2.0)
+    assert plan.approach > 0.0
+    sensors, dt = Sensors(position_resolution=1e-4), 1.0 / plan.rate
+    played = simulate_plan(plan, Plant(model), sensors, position=0.2)
+    run, live = ExcitationRun(plan), LivePlant(Plant(model), Plant(model).initial_state(position=0.2))
+    drive, rows = 0.0, []
+    while len(rows) < plan.time.size and run.phase is not Phase.ABORTED:
+        now = live.step(drive, dt)
+        seen = round(now.position / 1e-4) * 1e-4
+        rows.append((seen, now.force, now.drive))
+        drive = run.step((len(rows) - 1) * dt, seen)
+    assert played.aborted == run.reason
+    assert bool(run.reason) == (limit < 1.0)
+    for channel, column in zip(("position", "force", "drive"), np.transpose(rows), strict=True):
+        np.testing.assert_allclose(played.record[channel], column, rtol=1e-9, atol=1e-9)
+
+
+def test_a_model_that_no_step_follows_says_where(model) -> None:  # noqa: ANN001
+    stiff = Plant(model).with_parameters({"bulk_modulus": 1e30})
+    with pytest.raises(SimulationError, match="too stiff|no longer finite"):
+        simulate_plan(load_plan("chirp"), stiff)
 
 
 def test_sensors_add_their_noise_and_nothing_else(model) -> None:  # noqa: ANN001

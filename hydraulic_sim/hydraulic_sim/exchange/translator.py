@@ -18,7 +18,7 @@ from ..errors import EffectError
 MATH = frozenset(
     {
         *("sqrt", "exp", "log", "log1p", "expm1", "pow", "hypot", "floor", "ceil", "fabs", "copysign", "isfinite"),
-        *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh"),
+        *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "erf", "erfc"),
     }
 )
 """Functions of `math` that C has under the same name."""

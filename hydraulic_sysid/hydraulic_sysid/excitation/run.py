@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from hydraulic_sysid.excitation.answer import Answers, answer, strays, why
 from hydraulic_sysid.excitation.applied import AppliedDriveCheck
 from hydraulic_sysid.excitation.plan import Plan
 
@@ -45,12 +46,11 @@ class ExcitationRun:
         self.requested = False  # that it ends was asked for; nothing went wrong
         self.drive = 0.0
         self.played = 0
-        self._approach = round(plan.approach * plan.rate)  # samples
         self._state_timeout = state_timeout
         self._applied_check = applied_check
         # Lists of floats: indexing an array costs ten times more.
-        self._open_loop: list[float] = plan.open_loop.tolist()
-        self._envelope: list[float] = plan.envelope.tolist()
+        own = Answers.of(plan)
+        self._answers = own._replace(open_loop=plan.open_loop.tolist(), envelope=plan.envelope.tolist())
         self._start: float | None = None
         self._time = -math.inf
         self._index = -1
@@ -65,7 +65,7 @@ class ExcitationRun:
     @property
     def progress(self) -> float:
         """The played part of the plan, 0 … 1."""
-        return min(1.0, (self._index + 1) / len(self._open_loop))
+        return min(1.0, (self._index + 1) / len(self._answers.open_loop))
 
     def step(self, t: float, position: float, applied: float | None = None) -> float:
         """The drive [V] that answers the state sampled at `t` [s] with the piston at `position` [m].
@@ -109,15 +109,11 @@ class ExcitationRun:
         return silent
 
     def _guard(self, t: float, position: float, applied: float | None) -> None:
-        plan = self.plan
         if not math.isfinite(t) or t < self._time:
             self.abort(f"the time of the state went from {self._time:.6f} s to {t:.6f} s")
         self.check_age(t - self._time)
-        if not math.isfinite(position):
-            self.abort(f"the position is {position}")
-        elif abs(position - plan.centre) > plan.travel_limit and self._index >= self._approach:
-            low, high = 1e3 * (plan.centre - plan.travel_limit), 1e3 * (plan.centre + plan.travel_limit)
-            self.abort(f"the piston is at {1e3 * position:.1f} mm (allowed: {low:.1f} … {high:.1f} mm)")
+        if strays(self._answers, self._index, position):
+            self.abort(why(self._answers, position))
         if applied is not None and self._applied_check is not None:
             fault = self._applied_check.fault(t, applied)
             if fault:
@@ -125,21 +121,13 @@ class ExcitationRun:
 
     def _play(self, t: float, position: float) -> None:
         assert self._start is not None
-        plan = self.plan
-        index = round((t - self._start) * plan.rate)
-        if index >= len(self._open_loop):
+        index = round((t - self._start) * self.plan.rate)
+        if index >= len(self._answers.open_loop):
             self.phase, self.drive = Phase.FINISHED, 0.0
             return
         self.played += index > self._index
         self._index = index
-        if index < self._approach:
-            limit = plan.approach_limit
-            self.drive = min(max(-plan.approach_gain * (position - plan.centre), -limit), limit)
-            return
-        pull = -plan.centring_gain * (position - plan.centre)
-        pull = min(max(pull, -plan.centring_limit), plan.centring_limit)
-        drive = self._open_loop[index] + self._envelope[index] * pull
-        self.drive = min(max(drive, -plan.amplitude_limit), plan.amplitude_limit)
+        self.drive = answer(self._answers, index, position)
 
     def _fall(self) -> None:
         left = (self._end - self._time) / STOP_RAMP_S

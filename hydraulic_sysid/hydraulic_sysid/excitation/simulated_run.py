@@ -1,4 +1,4 @@
-"""A plan played on a model by the very code that plays it on the bench, faster than time."""
+"""A plan played on a model with the very answers that it gives on the bench, faster than time."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydraulic_interfaces.contract import STARTED
-from hydraulic_sim.live import LivePlant
+from hydraulic_sim import base
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.excitation import compiled_run
+from hydraulic_sysid.excitation.answer import Answers, why
 from hydraulic_sysid.excitation.plan import Plan, Prediction
-from hydraulic_sysid.excitation.run import ExcitationRun, Phase
 
 _CHANNELS = ("position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool", "force", "drive")
 
@@ -51,27 +53,25 @@ def simulate_plan(
     :raises SimulationError: the model cannot follow.
     """
     sensors = sensors or Sensors()
-    run = ExcitationRun(plan)
-    live = LivePlant(plant, plant.initial_state(position=plan.centre if position is None else position))
+    start = plant.initial_state(position=plan.centre if position is None else position)
+    answers, limit = Answers.of(plan), plant.value("drive_limit")
     count, dt = plan.time.size, 1.0 / plan.rate
     draw = np.random.default_rng(sensors.seed)
-    noise = (sensors.position_noise * draw.standard_normal(count)).tolist()
-    rows = np.empty((count, len(_CHANNELS)))
-    drive, done = 0.0, count
-    for index in range(count):
-        now = live.step(drive, dt)
-        rows[index] = now
-        seen = now.position + noise[index]
-        if sensors.position_resolution > 0.0:
-            seen = round(seen / sensors.position_resolution) * sensors.position_resolution
-        drive = run.step(index * dt, seen)
-        rows[index, 0], noise[index] = seen, now.position
-        if run.phase is Phase.ABORTED:
-            done = index + 1
-            break
-    done = max(done, 2)
-    columns = {name: rows[:done, i].copy() for i, name in enumerate(_CHANNELS)}
-    true = np.array(noise[:done])
+    seen = sensors.position_noise * draw.standard_normal(count)
+    plant.simulate([0.0], dt, start)  # refuses a rate that a memory cannot follow
+    drive, out = np.empty(count), np.empty((count, len(base.OUTPUTS)))
+    done, end = compiled_run.compiled()(
+        *plant.embedded()[:-1], start.states.copy(), start.memory.copy(), answers, dt, limit, seen,
+        sensors.position_resolution, out, drive,
+    )  # fmt: skip
+    if end == compiled_run.LOST:
+        plant.simulate(drive[: done + 1], dt, start)  # says where and why
+        raise SimulationError(f"{plant.model.name!r} cannot be followed beyond {done * dt:.6g} s")
+    aborted = why(answers, float(seen[done - 1])) if end == compiled_run.STRAYED else ""
+    columns = {name: out[:done, i].copy() for i, name in enumerate(base.OUTPUTS) if name in _CHANNELS}
+    force = columns["pressure_a"] * plant.value("piston_area_a") - columns["pressure_b"] * plant.value("piston_area_b")
+    columns |= {"force": force, "drive": drive[:done].copy()}
+    true, columns["position"] = columns["position"], seen[:done].copy()
     pressures = np.concatenate((columns["pressure_a"], columns["pressure_b"]))
     extremes = Prediction(
         model=plant.model.name,
@@ -86,4 +86,4 @@ def simulate_plan(
         columns[name] += sensors.pressure_noise * draw.standard_normal(done)
     columns["spool"] *= plant.value("spool_travel")
     description = {"experiment": {"event": STARTED, "plan": plan.as_mapping()}, "notes": ["simulated on a model"]}
-    return SimulatedRun(Record.sampled(plan.name, dt, columns, description=description), run.reason, extremes)
+    return SimulatedRun(Record.sampled(plan.name, dt, columns, description=description), aborted, extremes)
