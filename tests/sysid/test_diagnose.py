@@ -561,6 +561,9 @@ def test_the_step_of_codes_survives_what_a_text_file_rounds_away() -> None:
     often = np.tile(np.round(x, 6), 100)
     often[[7, 400]] += 0.3 * step, 21.7 * step  # spikes
     assert code_step(often) == pytest.approx(step, rel=1e-6)
+    seldom = np.round(x, 6)  # many codes are read but once, so that this does not show which values are spikes
+    seldom[::150] += 80.0 * step * np.linspace(-1.0, 1.0, 34)
+    assert code_step(seldom) == pytest.approx(step, rel=1e-5)
 
 
 def test_nonparametric_additions_are_effects_of_their_own_and_none_of_the_library(model) -> None:

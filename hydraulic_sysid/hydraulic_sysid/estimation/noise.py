@@ -22,7 +22,10 @@ from scipy.stats import chi2
 from hydraulic_sim.arrays import Array, Mask
 
 METHOD = "median over blocks of the mean square of fourth differences (white noise), at least LSB/√12"
-_STRAY = 0.01  # of the samples: values that are read once
+_STRAY = 0.01  # of the samples: those beside the lattice of the others
+_BESIDE = 0.1  # of a step, from which a value lies beside it
+_LEAST = (0.0, 0.01, 0.05, 0.2)  # quantiles of the steps between values, one of which is that of the lattice
+_FIRST = 10.0  # steps of a lattice, by which it is measured first
 _ORDER = 4
 _BLOCK = 100
 _AROUND = 101  # samples over which the scale of differences is taken
@@ -37,9 +40,7 @@ def resolution(signal: ArrayLike) -> float:
     values = np.unique(np.asarray(signal, dtype=float))
     if values.size < 2:
         return 0.0
-    steps = np.diff(values)
-    # Decimal text makes neighbours of one code differ by rounding errors: those are not steps.
-    steps = steps[steps > 1e-9 * max(abs(values[0]), abs(values[-1]))]
+    steps = _steps(values)
     return float(steps.min()) if steps.size else 0.0
 
 
@@ -47,18 +48,44 @@ def code_step(signal: ArrayLike) -> float:
     """The step between the codes of a rounded signal ``(N,)`` to a small part of it; 0 where it was not rounded.
 
     The values lie on a lattice; its step is the slope of the values over their number on it, which the digits that
-    a text file leaves out hardly change. A few values that nothing else reads, such as spikes, do not count.
+    a text file leaves out hardly change. A few values beside it, such as spikes, do not count.
     """
     values, counts = np.unique(np.asarray(signal, dtype=float), return_counts=True)
-    if counts[counts == 1].sum() < _STRAY * counts.sum():
-        values = values[counts > 1]
-    step = resolution(values)
-    if not step > 0.0 or values.size < 3:
+    steps = np.sort(_steps(values))
+    if steps.size < 2:
         return 0.0
-    number = np.concatenate(([0.0], np.cumsum(np.round(np.diff(values) / step))))
-    slope, start = np.polyfit(number, values, 1)
-    off = values - slope * number - start
-    return float(slope) if float(np.max(np.abs(off))) < 0.1 * slope else 0.0
+    for least in np.unique(np.quantile(steps, _LEAST, method="lower")).tolist():
+        step, off = _lattice(values, least)
+        if counts[off > _BESIDE].sum() <= _STRAY * counts.sum():
+            return step
+    return 0.0
+
+
+def _lattice(values: Array, step: float) -> tuple[float, Array]:
+    """The step of a lattice of about this ``step``, and how far sorted ``values`` lie beside it, of a step.
+
+    From a few of its codes to all: a small error of the step is a large one of where the far ones are.
+    """
+    way, span = values - values[values.size // 2], _FIRST * step
+    while True:
+        near = way[np.abs(way) <= span]
+        phase = np.exp(2j * np.pi * near / step)
+        middle = np.angle(phase.mean()) / (2.0 * np.pi)
+        number = np.round(near / step - middle)
+        off = np.abs(near / step - middle - number)
+        good = off <= _BESIDE
+        if good.sum() < 2 or number[good][0] == number[good][-1]:
+            return 0.0, np.ones(values.size)
+        step = float(np.polyfit(number[good], near[good], 1)[0])
+        if near.size == values.size:
+            return step, off
+        span *= 4.0
+
+
+def _steps(values: Array) -> Array:
+    """Between neighbours of sorted ``values``: decimal text makes those of one code differ, which is no step."""
+    steps: Array = np.diff(values)
+    return steps[steps > 1e-9 * max(abs(values[0]), abs(values[-1]))]
 
 
 def noise_std(signal: ArrayLike) -> float:
