@@ -11,8 +11,7 @@ from hydraulic_sim import base
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.excitation import compiled_run
-from hydraulic_sysid.excitation.answer import Answers, why
+from hydraulic_sysid.excitation.answer import LOST, STRAYED, Answers, compiled_play, why
 from hydraulic_sysid.excitation.plan import Plan, Prediction
 
 _CHANNELS = ("position", "velocity", "pressure_a", "pressure_b", "pressure_supply", "spool", "force", "drive")
@@ -60,14 +59,14 @@ def simulate_plan(
     seen = sensors.position_noise * draw.standard_normal(count)
     plant.simulate([0.0], dt, start)  # refuses a rate that a memory cannot follow
     drive, out = np.empty(count), np.empty((count, len(base.OUTPUTS)))
-    done, end = compiled_run.compiled()(
+    done, end = compiled_play()(
         *plant.embedded()[:-1], start.states.copy(), start.memory.copy(), answers, dt, limit, seen,
         sensors.position_resolution, out, drive,
     )  # fmt: skip
-    if end == compiled_run.LOST:
+    if end == LOST:
         plant.simulate(drive[: done + 1], dt, start)  # says where and why
         raise SimulationError(f"{plant.model.name!r} cannot be followed beyond {done * dt:.6g} s")
-    aborted = why(answers, float(seen[done - 1])) if end == compiled_run.STRAYED else ""
+    aborted = why(answers, float(seen[done - 1])) if end == STRAYED else ""
     columns = {name: out[:done, i].copy() for i, name in enumerate(base.OUTPUTS) if name in _CHANNELS}
     force = columns["pressure_a"] * plant.value("piston_area_a") - columns["pressure_b"] * plant.value("piston_area_b")
     columns |= {"force": force, "drive": drive[:done].copy()}
