@@ -259,11 +259,13 @@ class Segments:
     def _bent(self, plant: Plant) -> Array:
         """(S,) how far the bristles are bent: in full above `STICK_SPEED`, in proportion below.
 
-        Those that are longer than what the noise of the position hides, by the way gone since the piston last turned.
+        Those that are longer than what the noise of the position hides, by the way gone since the piston last turned;
+        not without hydraulics, where the acceleration says it (`_slid`), whatever the law of the bristles.
         """
         length = plant.bristle_length
         position, velocity = (self.smoothed[self.first, _STATES.index(name)] for name in ("position", "velocity"))
-        if length < float(self.noise_std[self.channels.index("position")]):
+        hidden = length < float(self.noise_std[self.channels.index("position")])
+        if hidden or plant.model.kind != "hydraulic":
             return np.clip(velocity / STICK_SPEED, -1.0, 1.0)
         bent, before = np.zeros(len(self._turns)), np.searchsorted(self._turns, self.first, side="right") - 1
         turned = self.smoothed[self._turns, _STATES.index("position")]
