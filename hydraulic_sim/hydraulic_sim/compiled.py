@@ -9,12 +9,20 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
+from numba import types
+
 from hydraulic_node_utils import generated_code
 
-from . import embedded, kernels
+from . import kernels
 from .compose import Layout, write_module
 from .errors import EffectError
 from .registry import Library
+
+RUN = types.int64(
+    types.float64[::1], *[types.float64] * 4, types.uint8[::1], types.float64[::1], types.uint8, types.float64[::1],
+    types.float64[::1], types.float64[:, ::1], types.float64[::1],
+)  # fmt: skip
+"""The signature of `CompiledPlant.run`, the same for every library: compiled code can call it by a pointer."""
 
 
 class CompiledPlant:
@@ -30,8 +38,7 @@ class CompiledPlant:
 
 
 def _load(library: Library) -> ModuleType:
-    files = kernels.__file__, embedded.__file__, __file__
-    rests_on = (library.fingerprint, *(Path(f).read_text(encoding="utf-8") for f in files))
+    rests_on = (library.fingerprint, *(Path(f).read_text(encoding="utf-8") for f in (kernels.__file__, __file__)))
     functions = {
         f"{effect.name}.{which}": function
         for effect in library.values()

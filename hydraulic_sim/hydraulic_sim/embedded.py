@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from . import base
 from .arrays import Array
@@ -15,13 +14,6 @@ POSITION, VELOCITY, PRESSURE_A, PRESSURE_B, TRUE_POSITION = (
     base.OUTPUTS.index(name) for name in ("position", "velocity", "pressure_a", "pressure_b", "true_position")
 )
 """Columns of the outputs."""
-
-
-RUN = types.int64(
-    types.float64[::1], *[types.float64] * 4, types.uint8[::1], types.float64[::1], types.uint8, types.float64[::1],
-    types.float64[::1], types.float64[:, ::1], types.float64[::1],
-)  # fmt: skip
-"""The signature of `Embedded.run`, the same for every library: compiled code can call it by a pointer."""
 
 
 class Embedded(NamedTuple):

@@ -80,7 +80,7 @@ MODULE = '''
 import math
 import numpy as np
 from numba import njit
-from hydraulic_sim.embedded import RUN
+from hydraulic_sim.compiled import RUN
 from hydraulic_sim.kernels import clamp, smooth_root_gain
 
 {functions}

@@ -14,11 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hydraulic_sim import base
 from hydraulic_sim.arrays import Array
+from hydraulic_sim.embedded import POSITION
 from hydraulic_sysid.excitation.plan import Plan
 
-POSITION = base.OUTPUTS.index("position")
 DONE, LOST, STRAYED = range(3)
 """How a rehearsal ends: as planned, with a plant that cannot be followed, or where its piston may not be."""
 
@@ -100,7 +99,7 @@ def compiled_play() -> Callable[..., tuple[int, int]]:
     from numba import njit, types  # a bench that rehearses nothing needs none of it
     from numba.extending import register_jitable
 
-    from hydraulic_sim.embedded import RUN
+    from hydraulic_sim.compiled import RUN
 
     for called in (answer, strays):
         register_jitable(called)
