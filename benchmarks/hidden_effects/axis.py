@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from scipy import signal
 
 RATE = 1000.0
 SUBSTEPS = 20
@@ -19,6 +20,7 @@ NOISE = 3e-6  # m; a sensor well below the bristles' 8 um would make a question 
 PLAIN = {"mass": 95.1, "viscous": 203.5, "coulomb": 20.4, "load": -3.2, "bristle": 8e-6}
 STROKES = ((0.24, 2.6), (0.0, 2.6), (0.24, 3.6), (0.0, 3.6), (0.12, 2.2), (0.24, 2.2), (0.0, 5.0))  # to m, in s
 REST = 0.25  # s between strokes
+WANDERS = 0.01  # s, of the force that no law gives
 
 
 def reference() -> np.ndarray:
@@ -32,13 +34,15 @@ def reference() -> np.ndarray:
 
 
 @njit
-def _follow(goal, noise, mass, forward, backward, coulomb_forward, coulomb_backward, load, bristle, out):
+def _follow(
+    goal, noise, disturbance, step, mass, forward, backward, coulomb_forward, coulomb_backward, load, bristle, out
+):
     h = 1.0 / (RATE * SUBSTEPS)
     x, v, z, before = 0.0, 0.0, 0.0, 0.0
     stiff = 0.5 * (coulomb_forward + coulomb_backward) / bristle
     smooth = 0.0
     for k in range(len(goal)):
-        y = STEP * np.floor((x + noise[k]) / STEP + 0.5)
+        y = step * np.floor((x + noise[k]) / step + 0.5)
         old = smooth
         smooth = 0.5 * (y + before)
         before = y
@@ -51,21 +55,32 @@ def _follow(goal, noise, mass, forward, backward, coulomb_forward, coulomb_backw
             rate = stiff * abs(v) / level
             fade = np.exp(-rate * h)
             z = z * fade + (v * (1.0 - fade) / rate if rate > 1e-9 else v * h)
-            force = FORCE * u + load - stiff * z - 0.5 * np.sqrt(stiff * mass) * (v - rate * z)
+            force = FORCE * u + load + disturbance[k] - stiff * z - 0.5 * np.sqrt(stiff * mass) * (v - rate * z)
             v = (v + h * force / mass) / (1.0 + h * viscous / mass)
             x += h * v
 
 
-def run(rng: np.random.Generator, viscous_difference: float = 0.0, **values: float) -> dict[str, np.ndarray]:
-    """One record: columns (n,) time_s, command_V, position_m. ``values`` differ from `PLAIN`; b± = b ± difference."""
+def run(
+    rng: np.random.Generator, viscous_difference: float = 0.0, noise: float = NOISE, step: float = STEP,
+    disturbance: float = 0.0, **values: float,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """One record: columns (n,) time_s, command_V, position_m. ``values`` differ from `PLAIN`; b± = b ± difference.
+
+    ``noise`` of the position [m]; ``disturbance``: a force that wanders at random by so much [N], as cogging does.
+    """
     p = PLAIN | values
     goal = reference()
     out = np.empty((len(goal), 2))
+    read = noise * rng.standard_normal(len(goal))
+    kept = np.exp(-1.0 / (WANDERS * RATE))
+    wander = signal.lfilter([np.sqrt(1.0 - kept**2)], [1.0, -kept], rng.standard_normal(len(goal)))
     _follow(
-        goal, NOISE * rng.standard_normal(len(goal)), p["mass"], p["viscous"] + viscous_difference,
+        goal, read, disturbance * wander, step, p["mass"], p["viscous"] + viscous_difference,
         p["viscous"] - viscous_difference, p["coulomb"], p["coulomb"], p["load"], p["bristle"], out,
     )  # fmt: skip
-    return {"time_s": np.arange(len(goal)) / RATE, "command_V": out[:, 0].round(5), "position_m": out[:, 1].round(7)}
+    digits = round(-np.log10(step))
+    time = np.arange(len(goal)) / RATE
+    return {"time_s": time, "command_V": out[:, 0].round(5), "position_m": out[:, 1].round(digits)}
 
 
 MODEL = """format: hydraulic-model-1

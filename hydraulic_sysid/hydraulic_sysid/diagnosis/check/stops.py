@@ -24,6 +24,7 @@ from .finding import DOUBTFUL, Finding
 from .travel import TOUCH, readings_at_stops
 
 OPEN = 0.05  # of full opening, beyond any overlap: a valve that drives the piston against what it rests at
+HELD = 1.5  # times the friction of the model, which a piston without oil may rest under
 SMOOTH = 25  # parts of a segment, over one of which a position is averaged
 STILL = 0.2  # of what a stop gives way: what a piston at rest may seem to move
 LONG = 0.5  # of a segment, that a rest lasts
@@ -47,7 +48,7 @@ def other_stops(model: Model, records: Sequence[Record], length: float) -> list[
     """
     if "stroke" not in model.entries:
         return []
-    touch, opened = TOUCH * model.value("stroke"), OPEN * model.value("drive_limit")
+    touch, opened = TOUCH * model.value("stroke"), _open(Plant(model))
     smooth = [_smoothed(r, length) for r in records]
     judged = [x[unjudged(r) :] for x, r in zip(smooth, records, strict=True)]
     ends = min(float(x.min()) for x in judged), max(float(x.max()) for x in judged)
@@ -79,6 +80,18 @@ def wrong_stops(model: Model, records: Sequence[Record], length: float) -> list[
         names = tuple(r.name for r, at in zip(records, one.near, strict=True) if at.any())
         found.append(Finding("stop", "position", DOUBTFUL, text, remedy, one.at, one.stated, "m", names))
     return found
+
+
+def _open(plant: Plant) -> float:
+    """The drive [V] that moves a piston, unless a stop holds it: one without oil rests under less than its friction."""
+    opened = OPEN * plant.value("drive_limit")
+    force = abs(plant.value("drive_force")) if plant.model.kind == "mechanical" else 0.0
+    if not force:
+        return opened
+    state, stick = np.zeros((2, len(plant.layout.states))), plant.layout.states["stick"]
+    state[:, stick] = -1.0, 1.0
+    held = [plant.derivative(one, 0.0)[1]["force"] for one in state]
+    return max(opened, HELD * abs(held[0] - held[1]) / 2.0 / force)
 
 
 def _stands(position: Array, least: float) -> bool:

@@ -48,6 +48,6 @@ def add(
     model.with_effect(effect).check_complete()
     say = progress or (lambda _: None)
     found = Search.of(model, records, validation, settings or FitSettings(), say, watch=watch).add(effect)
-    confirmed = material(found.base.misfit, found.final.misfit)
+    confirmed = found.by_force is not None or material(found.base.misfit, found.final.misfit)
     known = parameter_errors(found.final.linearisation, tolerances(found.model))
     return Addition(as_filed(finished(found, known), model), confirmed, added_document(found, known, confirmed))

@@ -127,6 +127,9 @@ def document(
     }
 
 
+REFUTED = ": no more than chance or fitting gives; the data do not bear it out."
+
+
 def _fault(found: RecordingFault) -> dict[str, Any]:
     return {
         "name": found.hypothesis.name,
@@ -149,7 +152,7 @@ def added_document(result: SearchResult, known: Mapping[str, Known], confirmed: 
     whole["verdict"] |= {
         "kind": "confirmed" if confirmed else "not confirmed",
         "level": whole["verdict"]["level"] if confirmed else "off",
-        "text": text + ("." if confirmed else ": no more than chance or fitting gives; the data do not bear it out."),
+        "text": " ".join([text + ("." if confirmed else REFUTED), *verdicts.force_sentences(result, others=False)]),
     }
     unused = ("competing_models", "nonparametric_curves", "nearest_effects", "proposed_effect", "balances")
     return {k: v for k, v in whole.items() if k not in unused}

@@ -121,6 +121,11 @@ class Fitting:
         seen = refit_rounded(at, with_fitted_values(model, at.model))
         return SearchState(seen.model, at, misfit(self.split, seen.costs, self.prior_cost(seen.model)), seen.residual)
 
+    def as_it_is(self, model: Model) -> SearchState:
+        """A model with the values that it has."""
+        at = Linearisation.of(model, self.split, self.priors)
+        return SearchState(model, at, misfit(self.split, at.costs, at.parameters.prior_cost), at.residual)
+
     def fitted_to(self, segments: Sequence[Segments], model: Model, settings: FitSettings) -> Fit:
         """A model, without effects that have no derivative, fitted to these segments."""
         smooth = self._smooth(model)

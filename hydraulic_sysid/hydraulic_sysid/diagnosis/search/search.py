@@ -26,14 +26,16 @@ from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
 from .fitting import FAR_OFF, Task, quieter, retimed, spiked
-from .misfit import Misfit, explained, material
+from .force_balance import drives_by_force, force_shares
+from .misfit import SMALL, Misfit, explained, material
 from .progress import OutOfTimeError
-from .recording_fits import RecordingFits
-from .score_test import score
+from .recording_fits import RIVAL, RecordingFits
+from .score_test import CandidateScore, score
 from .search_state import SearchResult, SearchState
 from .set_aside import accidents
 from .spectral_lines import record_features
 from .worth import (
+    FURTHER,
     MOSTLY,
     NOTHING_LEFT,
     PROMISES,
@@ -77,7 +79,8 @@ class Search(RecordingFits):
         :raises OutOfTimeError: before there was anything.
         """
         try:
-            found = accidents_named(self.set_against_faults(self.concluded(decisive(self.searched()))))
+            concluded = self.by_force(self.concluded(decisive(self.searched())))
+            found = accidents_named(self.set_against_faults(concluded))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)
             return self.with_drift(found)
@@ -85,6 +88,29 @@ class Search(RecordingFits):
             if not self.path:
                 raise
             return self.so_far()
+
+    def by_force(self, found: SearchResult) -> SearchResult:
+        """With the effect that explains the force which is left, where a sensor shows more than any law is right to.
+
+        One that explains a good part of it, by far the most.
+        """
+        if found.added or not judged_by_force(found.final):
+            return found
+        try:
+            return self.with_force(found, found.final.model, self.scores(found.final))
+        except SimulationError:  # with one of them
+            return found
+
+    def with_force(self, found: SearchResult, model: Model, scores: Sequence[CandidateScore]) -> SearchResult:
+        """The same of these candidates, beside a model; its values and the effect's are what the forces ask for."""
+        self.say("the force that the motion asks for beyond the model")
+        shares = force_shares(model, self.split.records(), scores)
+        if not shares or shares[0].share < FURTHER or any(s.share > RIVAL * shares[0].share for s in shares[1:]):
+            return found
+        best = shares[0]
+        base, state = self.as_it_is(best.without), self.as_it_is(best.model)
+        self.say.reached([best.name], state.misfit)
+        return replace(found, base=base, final=state, misfits={best.name: state.misfit}, by_force=best)
 
     def with_drift(self, found: SearchResult) -> SearchResult:
         """With the parameter of its final model that changes along the records, if there is one."""
@@ -209,7 +235,8 @@ class Search(RecordingFits):
         self.say.reached([name], final.misfit)
         base = replace(self.state(base.model, self._last), refits=[tried], scores=scores)
         found = SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
-        return accidents_named(self.concluded(found))
+        found = self.concluded(found)
+        return accidents_named(self.with_force(found, base.model, scores) if judged_by_force(base) else found)
 
     def _reviewed(
         self, base: SearchState, state: SearchState, added: list[str], competing: dict[str, SearchState]
@@ -270,6 +297,11 @@ class Search(RecordingFits):
             except SimulationError:  # with the values that it has beside the others
                 found[name] = next(reversed(found.values()), base.misfit)
         return {**found, **{name: final.misfit for name in order[-1:]}}
+
+
+def judged_by_force(base: SearchState) -> bool:
+    """Whether what a state leaves is nothing to anybody, but by the sensor's noise much, and its drive is the force."""
+    return base.immaterial and base.misfit.usual > SMALL and drives_by_force(base.model)
 
 
 def accidents_named(found: SearchResult) -> SearchResult:

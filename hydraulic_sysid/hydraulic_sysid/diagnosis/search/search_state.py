@@ -15,6 +15,7 @@ from hydraulic_sysid.estimation.segments import Segments
 
 from .data_sheet import Deviation
 from .drift import Drift
+from .force_balance import ForceShare
 from .frozen_jacobian import Refit
 from .holdout import Split
 from .linearisation import Linearisation
@@ -97,6 +98,8 @@ class SearchResult:
     numbers_instead: Sequence[Deviation] = ()
     as_recorded: SearchState | None = None
     drift: Drift | None = None
+    by_force: ForceShare | None = None
+    """What the one effect added explains of the force that was left; where that, not the residual, has named it."""
     stopped: bool = False
     """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""
 

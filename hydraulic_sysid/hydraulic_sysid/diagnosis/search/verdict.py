@@ -142,7 +142,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     if result.drift is not None and not drive_unknown(result):
         return OUTSIDE
     final = result.final.misfit
-    little = final.little or immaterial(final, result.remainders)
+    little = final.little or immaterial(final, result.remainders) or result.by_force is not None
     if not result.added:
         # Faults of the recording may have explained the most of it.
         if not little and result.unexplained_share > UNEXPLAINED:
@@ -217,11 +217,12 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         return " ".join(["Recording:", *found, fell, left, UNCERTAIN if drive_unknown(result) else NO_EFFECT])
     if verdict.kind == DATA_SHEET:
         return " ".join(["Data sheet:", *data_sheet_sentences(result), *aside, fell, left, NO_EFFECT])
-    beside = [*data_sheet_sentences(result), *recording_sentences(result), *aside]
+    beside = [*force_sentences(result), *data_sheet_sentences(result), *recording_sentences(result), *aside]
     if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > UNEXPLAINED:
         beside.append(remainder_sentence(result.remainders))
     if verdict.kind == MISSING:
-        return " ".join([f"Missing: {_and(result.added)}. {fell}", *_instead(verdict), *_numbers(result), *beside])
+        fall = [] if result.by_force is not None else [fell]
+        return " ".join([f"Missing: {_and(result.added)}.", *fall, *_instead(verdict), *_numbers(result), *beside])
     if verdict.kind == INDISTINGUISHABLE:
         parts = []
         for name in result.added:
@@ -242,6 +243,18 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         text += f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
     # Not what the numbers of the data sheet were bent to: they imitate what no effect explains.
     return " ".join([text.strip(), *recording_sentences(result), *aside])
+
+
+def force_sentences(result: SearchResult, others: bool = True) -> list[str]:
+    """Why an effect is named that hardly lowers the residual, where the force has named it; of all ``others``."""
+    if result.by_force is None:
+        return []
+    share, left = percent(result.by_force.share), f"{result.by_force.left:.2g} N"
+    explains = f"{result.by_force.name} explains {share} of the mean square"
+    return [
+        "These sensors show more than any law is right to, so that forces are compared: of what the motion asks for "
+        f"beyond the model ({left} rms), {explains}{', and no other effect nearly as much' if others else ''}."
+    ]
 
 
 def _why_alike(model: Model) -> str:
