@@ -21,6 +21,7 @@ from .trajectory import PlantState, Trajectory
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
+STOPS = "end_stop"
 FIT_STEP, FIT_REFINEMENT = 1e-3, 2.2  # half as fine: off by a hundredth of the sensors' noise on all benches tried
 YIELDS = {"hydraulic": 1e-5, "mechanical": 1e-4}  # of the stroke, by the full force: less than sensors of such see
 HEAVY = 1e6
@@ -59,6 +60,7 @@ class Plant:
         values = self._values()
         self.refinement, self._allowed_step = refinement, longest_step
         self.longest_step = rates.step(rates.fastest(self._active, values, model.kind), longest_step, refinement)
+        self._clear_step = rates.step(rates.fastest(self._but_stops, values, model.kind), longest_step, refinement)
         self._shortest_dt = rates.shortest_sampling(self._active, values)
         self._corrected_every = CORRECTED_EVERY
 
@@ -83,7 +85,7 @@ class Plant:
 
         End stops so stiff that no sensor sees them yield would ask for short steps everywhere, and are softer.
         """
-        key = "end_stop.stiffness"
+        key = f"{STOPS}.stiffness"
         if not model.entry(key).free:
             values = {k: model.value(k) for k in model.keys()}  # noqa: SIM118, a method of the model
             if model.kind == "hydraulic":
@@ -142,10 +144,31 @@ class Plant:
                 self.model.parameter(key)
                 raise
         now = other._values()
-        followed = rates.step(rates.fastest(self._active, now, self.model.kind), self.longest_step, self.refinement)
-        if followed < min(0.5 * self.refinement, 0.75) * self.longest_step:
-            other.longest_step = followed
+        other.longest_step = self._followed(self._active, now, self.longest_step)
+        other._clear_step = self._followed(self._but_stops, now, self._clear_step)
         other._shortest_dt = rates.shortest_sampling(self._active, now)
+        return other
+
+    def _followed(self, active: Iterable[Effect], values: dict[str, float], longest: float) -> float:
+        """The ``longest`` step [s], or a shorter one for physics that has become too fast for it."""
+        step = rates.step(rates.fastest(active, values, self.model.kind), longest, self.refinement)
+        return step if step < min(0.5 * self.refinement, 0.75) * longest else longest
+
+    @property
+    def _but_stops(self) -> tuple[Effect, ...]:
+        return tuple(e for e in self._active if e.name != STOPS)
+
+    def clear_of_stops(self) -> Plant:
+        """This plant for a piston that stays clear of its end stops: without them, where they ask for shorter steps.
+
+        On a small piston they are the stiffest of all.
+        """
+        if self._clear_step <= self.longest_step:
+            return self
+        other = copy.copy(self)
+        other._on, other._active = self._on.copy(), self._but_stops
+        other._on[self.layout.effects[STOPS]] = 0
+        other.longest_step = self._clear_step
         return other
 
     def value(self, key: str) -> float:

@@ -157,6 +157,29 @@ def test_a_stop_far_stiffer_than_the_oil_asks_for_no_short_steps_in_fits(bench: 
     assert 0.0 < hard - 0.762 < soft - 0.762 < 1e-5 * light.value("stroke")
 
 
+def test_a_light_piston_clear_of_its_stops_takes_longer_steps_the_same_way(bench: Model) -> None:
+    light = bench.without_effect("coulomb_friction").with_entry("moving_mass", value=1.0, bounds=(0.5, 2.0))
+    light = light.with_values({
+        "piston_area_a": 2e-4, "piston_area_b": 2e-4, "viscous_friction.coefficient": 300.0, "valve_flow": 1e-4,
+        "stroke": 0.2, "dead_volume_a": 2e-5, "dead_volume_b": 2e-5,
+    })  # fmt: skip
+    stopped = Plant.for_fits(light)
+    clear = stopped.clear_of_stops()
+    assert clear.longest_step > 2.0 * stopped.longest_step
+    assert Plant.for_fits(bench).clear_of_stops().longest_step == Plant.for_fits(bench).longest_step
+    nudged = stopped.with_parameters({"moving_mass": 1.01})
+    assert nudged.clear_of_stops().longest_step == clear.longest_step, "small changes must not change the step"
+    lighter = stopped.with_parameters({"moving_mass": 0.01})
+    assert lighter.clear_of_stops().longest_step < clear.longest_step, "what becomes far faster must"
+    drive, start = 2.0 * np.sin(2.0 * np.pi * 2.0 * 1e-3 * np.arange(1000)), stopped.initial_state()
+    runs = [p.simulate(drive, 1e-3, start) for p in (stopped, clear)]
+    assert np.abs(runs[0].position).max() < 0.08
+    for name in ("position", "pressure_a"):
+        assert runs[1][name] == pytest.approx(runs[0][name], abs=1e-3 * float(np.ptp(runs[0][name]))), name
+    ahead = {p: p.simulate(np.full(400, 8.0), 1e-3, start).position[-1] for p in (stopped, clear)}
+    assert ahead[stopped] < 0.1001 < ahead[clear], "without stops it goes on"
+
+
 def test_a_held_plant_goes_the_same_path_whatever_its_forces(bench: Model) -> None:
     one = Plant.for_fits(bench)
     drive, seen, starts = slowly(Plant(bench))

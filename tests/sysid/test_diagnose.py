@@ -15,7 +15,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict, worth
-from hydraulic_sysid.diagnosis.search.candidate_fits import varied
+from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits, varied
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, HeldNumbers, as_filed, relaxed
@@ -239,6 +239,31 @@ def test_what_no_curve_explains_is_no_other_effect(model, share: float | None, k
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     curves = [] if share is None else [SimpleNamespace(share=share)]
     assert verdict.kind_of(found, tied=False, curves=curves) == kind
+
+
+@pytest.mark.parametrize(
+    ("after", "share", "kind"),
+    [
+        (20.0, 0.6, verdict.OUTSIDE),  # far more than noise, most of which a law at some place explains
+        (20.0, 0.4, verdict.MISSING),
+        (5.0, 0.6, verdict.MISSING),  # so much the laws of effects that are there leave
+    ],
+)
+def test_an_effect_that_explains_nearly_all_may_leave_another(model, after: float, share: float, kind: str) -> None:
+    base, final = state(model, 3000 * 5000.0, {}), state(model.with_effect("constant_load"), 3000 * after, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
+    assert verdict.kind_of(found, tied=False) == verdict.MISSING
+    assert verdict.kind_of(found, tied=False, curves=[SimpleNamespace(share=share)]) == kind
+
+
+@pytest.mark.parametrize(("explained", "simpler"), [(0.0, False), (5e6, True)])
+def test_beside_what_explains_much_a_parameter_must_explain_more(model, explained: float, simpler: bool) -> None:
+    """Of two effects that leave 100 more or less; what laws found before are off is 0.0005 of what they explain."""
+    search = CandidateFits.__new__(CandidateFits)
+    search.path = [state(model, 3000.0 + explained, {}), state(model, 3000.0, {})]
+    few, many = (replace(state(model, left, {}), linearisation=SimpleNamespace(parameters=range(n)))
+                 for left, n in ((2500.0, 5), (2400.0, 7)))  # fmt: skip
+    assert (search.with_freedom(few) < search.with_freedom(many)) is simpler
 
 
 @pytest.mark.parametrize(

@@ -133,6 +133,29 @@ def test_longer_steps_leave_an_error_far_below_the_noise(model: Model, segments:
         assert np.sqrt(np.mean(error**2)) < 0.05 * std, channel
 
 
+def test_segments_that_stay_clear_of_the_stops_run_without_them(model: Model) -> None:
+    """Of a light piston, whose stops ask for short steps: those that meet one, or come near, run as they always do."""
+    light = model.with_values({
+        "moving_mass": 1.0, "piston_area_a": 2e-4, "piston_area_b": 2e-4, "valve_flow": 1e-4, "stroke": 0.2,
+        "dead_volume_a": 2e-5, "dead_volume_b": 2e-5, "coulomb_friction.level": 30.0,
+    })  # fmt: skip
+    plant, time = Plant.for_fits(light), DT * np.arange(round(4.0 / DT))
+    drive = np.where(time < 2.0, 1.5 * np.sin(2.0 * np.pi * time), 4.0 * np.sin(2.0 * np.pi * 0.5 * time))
+    run = Plant(light).simulate(drive, DT)
+    cuts = cut([Record.sampled("both", DT, {"drive": drive, **{c: run[c] for c in NOISE}})], "hydraulic", 0.5)
+    shooting, (s,) = Shooting(plant, cuts), cuts
+    clear = np.abs(s.measured[..., s.channels.index("position")]).max(axis=1) < 0.09
+    assert clear.any() and not clear.all()
+    states = shooting.initial_states
+    (found,) = shooting.simulated(plant, states)
+    with_stops = plant.predict(s.drive, DT, s.first, s.samples - 1, states[0], None, s.turning(plant))
+    for c, channel in enumerate(s.channels):
+        assert np.array_equal(found[~clear][..., c], with_stops[channel][~clear])
+        assert not np.array_equal(found[clear][..., c], with_stops[channel][clear]), "with other steps"
+        near = 2e-3 * float(np.ptp(with_stops[channel]))
+        assert found[clear][..., c] == pytest.approx(with_stops[channel][clear], abs=near)
+
+
 def test_directions_that_are_kept_lead_to_the_same_minimum(model: Model, segments: list[Segments]) -> None:
     """Those of the initial states are taken anew at the end, so that fitting on gains nothing."""
     key = "viscous_friction.coefficient"

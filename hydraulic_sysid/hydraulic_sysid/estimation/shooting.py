@@ -28,6 +28,7 @@ _MOST_KNOWN = 256  # propagations along a record that are kept
 _STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
 _STEP = 2e-3  # difference step of a parameter, of its value, …
 _LEAST_STEP = 0.1  # … or of so much of its scale
+_NEAR_STOP = 0.05  # of the stroke: what goes no nearer to an end of it stays clear of the stop
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel
 _VELOCITY_STEP = 1e-3  # m/s
 _PRESSURE_STEP = 1e5  # Pa, where the pressure is not measured
@@ -213,11 +214,19 @@ class Shooting:
         segments = self.segments[i]
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.drive if drive is None else drive
-        run = self._beside(plant, i).predict(
-            drive, segments.record.dt, segments.first, segments.samples - 1, states, memories, self._turning[i],
-            segments.shown if plant.begins_shown else None,
-        )  # fmt: skip
-        return np.stack([run[c] for c in segments.channels], axis=-1)
+        beside, shown = self._beside(plant, i), segments.shown if plant.begins_shown else None
+        free = beside.clear_of_stops()
+        clear = self._clear[i] if free is not beside else np.ones(len(states), dtype=bool)
+        found = np.empty((len(states), segments.samples, len(segments.channels)))
+        for own, plant in ((clear, free), (~clear, beside)):
+            if own.any():
+                run = plant.predict(
+                    drive, segments.record.dt, segments.first[own], segments.samples - 1, states[own],
+                    None if memories is None else memories[own], self._turning[i][own],
+                    None if shown is None else (shown[0][own], shown[1]),
+                )  # fmt: skip
+                found[own] = np.stack([run[c] for c in segments.channels], axis=-1)
+        return found
 
     def _inner(self, plant: Plant, i: int) -> Inner:
         """States that no sensor sees, propagated along the record up to each segment."""
@@ -296,6 +305,12 @@ class Shooting:
     def _beside(self, plant: Plant, i: int) -> Plant:
         """The plant with what record ``i`` states of the machine."""
         return plant.with_parameters(self.segments[i].record.settings)
+
+    @cached_property
+    def _clear(self) -> list[Mask]:
+        """Which segments (S,) of each record stay clear of the model's end stops."""
+        end = (0.5 - _NEAR_STOP) * self.plant.value("stroke")
+        return [np.abs(s.measured[..., s.channels.index("position")]).max(axis=1) < end for s in self.segments]
 
     def _projection(self, plant: Plant, i: int, states: Array) -> Projection:
         segments, inner = self.segments[i], self._inner(plant, i)

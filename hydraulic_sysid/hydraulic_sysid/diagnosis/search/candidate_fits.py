@@ -19,7 +19,7 @@ from .misfit import misfit
 from .score_test import CandidateScore, score
 from .search_state import CandidateRefit, SearchState
 from .spectral_lines import record_features
-from .worth import FAR, NOTHING_LEFT, Enough
+from .worth import ELSEWHERE, FAR, NOTHING_LEFT, Enough
 
 PROMISING = 0.04  # of the best predicted reduction, from which a candidate is refitted
 MOST_REFITS = 8
@@ -156,7 +156,16 @@ class CandidateFits(Fitting):
             base.refits[:] = sorted(best, key=lambda r: r.misfit.total)
             if self.better(base, state) and enough(tried.name, state.misfit, 1.0):
                 found.append(state)
-        return min(found, key=_with_freedom, default=None)
+        return min(found, key=self.with_freedom, default=None)
+
+    def with_freedom(self, state: SearchState) -> float:
+        """What a state leaves and what its free parameters are worth: of two that leave the same the simpler is taken.
+
+        A parameter is worth what BIC gives it, or what the laws of effects found before may leave for others.
+        """
+        found = max(self.path[0].misfit.total - self.path[-1].misfit.total, 0.0) if self.path else 0.0
+        each = max(state.misfit.freedom, ELSEWHERE * found)
+        return state.misfit.total + len(state.linearisation.parameters) * each
 
     def set_against_others(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
         """The refits to finish: the nearest, or what explains more once all parameters are free.
@@ -209,11 +218,6 @@ def _at_best(tried: CandidateRefit, state: SearchState) -> CandidateRefit:
     if tried.misfit.total <= state.misfit.total:
         return tried
     return replace(tried, refit=replace(tried.refit, model=state.model), misfit=state.misfit)
-
-
-def _with_freedom(state: SearchState) -> float:
-    """What a state leaves and what its free parameters are worth (BIC): of two that leave the same the simpler."""
-    return state.misfit.total + len(state.linearisation.parameters) * state.misfit.freedom
 
 
 def varied(found: Sequence[T], effects: Sequence[Effect], most: int) -> list[T]:

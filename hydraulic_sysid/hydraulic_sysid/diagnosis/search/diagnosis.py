@@ -109,7 +109,7 @@ def diagnose(
         proxy = explained(found.base.misfit, found.final.misfit) < HOPELESS
         suspect = found.base if proxy else found.final
         curves: list[NonparametricCurve] = []
-        if outside:
+        if outside or (found.added and found.final.misfit.usual > verdicts.RIGHT and not found.by_force):
             curves = nonparametric_curves(suspect.linearisation, say)
             verdict = verdicts.reviewed(verdict, found, curves)
             outside = verdict.kind == verdicts.OUTSIDE

@@ -272,7 +272,7 @@ class Search(RecordingFits):
                 state = again
             near = near_competitors(base, without, state, name)
             other = self.finish(near, anything) if swaps < MOST_SWAPS else None
-            if other is not None and state.misfit.total - other.misfit.total > state.misfit.least:
+            if other is not None and self.with_freedom(state) - self.with_freedom(other) > state.misfit.least:
                 new = new_effect(other, without)
                 self.say(f"{new} in the place of {name}")
                 added = [new if a == name else a for a in added]

@@ -44,6 +44,8 @@ MUCH = 4.0  # … and from which on it is not what is wrong
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
 BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to 15 %
 UNATTRIBUTED = 0.1  # of what is left: a curve that explains less of it shows no law that is missing
+SHOWN = 0.5  # of what is left: a curve that explains more of it is a law that is missing, where more than …
+RIGHT = 9.0  # … this mean square over noise is left: the laws of effects rightly named left 7.2 at most
 STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
 IN_LINE = ("valve", "sensor")  # subsystems that a signal passes on its way from the command to what is read
@@ -135,7 +137,8 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added.
 
     Where effects explain the most and none of the ``curves`` a part of the rest, that is how far their laws are off
-    those of the bench (the touch of a backlash, the start of a cushion): nothing else is missing.
+    those of the bench (the touch of a backlash, the start of a cushion): nothing else is missing. Where far more than
+    noise is left, and a curve explains the most of it, something else is.
     """
     if result.stopped:
         return UNDECIDED
@@ -151,6 +154,8 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     if little:
         return INDISTINGUISHABLE if tied else MISSING
     details = final.variance < SMALL or (bool(curves) and all(c.share < UNATTRIBUTED for c in curves))
+    if final.usual > RIGHT and any(c.share > SHOWN for c in curves):
+        return OUTSIDE
     allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if details else BESIDE
     if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
