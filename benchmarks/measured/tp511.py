@@ -98,7 +98,7 @@ def study(data: Path, work: Work) -> list[Row]:
     errors = error(before, test), error(after, test)
     level, viscous = after.value("coulomb_friction.level"), after.value("viscous_friction.coefficient")
     friction_picture(seen, bare, after, work)
-    named = {"coulomb_friction", "stribeck_friction"} & set(found["verdict"]["effects"])  # dry, both; which, is not known
+    named = {"coulomb_friction", "stribeck_friction"} & set(found["verdict"]["effects"])  # dry, both
     return [Row(
         "Festo TP511", verdict, evidence, "position in free run over mid stroke, before and with coulomb_friction [mm]",
         *errors, "the author states viscous friction only",
