@@ -5,7 +5,8 @@ error of the two counts. What a record says of a parameter depends on its experi
 quite the true one; the scatter between records then holds that too. What all records share of that they cannot show: no
 law of a library is that of a bench to the last per cent, and an interval is never narrower (a model discrepancy in the
 sense of Kennedy & O'Hagan, J. R. Statist. Soc. B 63 (2001), as a fixed share). The laws of effects are the rougher
-ones; the search takes them to be right to a twentieth, too (`search.LAW`). Numbers of the data sheet that a fit holds
+ones, and what shapes them is the roughest. The shares are those with which 89 of 94 intervals of benches with other laws
+covered the truth; of 67 others 62 did. Numbers of the data sheet that a fit holds
 are not exact either: what they may be off within their tolerance moves the parameters, and is in the errors (their
 covariance with all of them free under their priors, less that of the fit).
 """
@@ -23,13 +24,15 @@ from scipy.stats import t as student
 
 from hydraulic_sim.arrays import Array, Index
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.covariance import inverse, sandwich
 
 from .linearisation import Linearisation
 
 _LAW = 0.01  # of a parameter's value: standard error for the law that it stands in, of the base physics …
-_EFFECT = 0.025  # … and of an effect
+_EFFECT = 0.045  # … of an effect, by which so much of it may be another law's …
+_SHAPE = 0.08  # … and of what shapes its law (a speed, a gap, a time), which others write down otherwise
 _COVERED = 0.95
 _FEWEST = 3  # records whose scatter says something
 _STEP = 0.25  # of a tolerance: how far a held number is moved to see what it changes
@@ -65,7 +68,7 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
     for key, error, width, value, scale in zip(
         parameters.keys, errors.tolist(), widths.tolist(), parameters.values.tolist(), parameters.scales, strict=True
     ):
-        law = (_EFFECT if "." in key else _LAW) * abs(value)
+        law = _share(at.model, key) * abs(value)
         known = error < 1e3
         found[key] = Known(
             math.hypot(error * scale, law) if known else math.inf,
@@ -73,6 +76,13 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
             at_bound.get(key),
         )
     return found
+
+
+def _share(model: Model, key: str) -> float:
+    """Standard error of a parameter for the law that it stands in, of its value."""
+    if "." not in key:
+        return _LAW
+    return _SHAPE if model.parameter(key).null is None else _EFFECT
 
 
 def _of_held(at: Linearisation, free: Index, bread: Array, tolerances: Mapping[str, float]) -> Array:
