@@ -79,8 +79,8 @@ class Search(RecordingFits):
         :raises OutOfTimeError: before there was anything.
         """
         try:
-            concluded = self.by_force(self.concluded(decisive(self.searched())))
-            found = accidents_named(self.set_against_faults(concluded))
+            concluded = self.set_against_faults(self.concluded(decisive(self.searched())))
+            found = accidents_named(self.by_force(concluded))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)
             return self.with_drift(found)

@@ -118,7 +118,9 @@ class SearchResult:
 
     @property
     def unexplained_share(self) -> float:
-        """What is left in the end, of what was there before anything was explained (0…1)."""
+        """What is left in the end, of what was there before anything was explained (0…1); of the force, if by that."""
+        if self.by_force is not None:
+            return 1.0 - self.by_force.share
         return unexplained_share(self.before, self.final.misfit)
 
     @property
