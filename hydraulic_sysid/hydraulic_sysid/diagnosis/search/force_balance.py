@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from hydraulic_sim.arrays import Array, Mask
-from hydraulic_sim.effect import Effect
+from hydraulic_sim.effect import Effect, arguments
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.compare.channels import Scales, measured
@@ -33,7 +33,7 @@ STEP = 1e-3  # difference step of a parameter, of its scale
 NOISY = 0.3  # of the mean square that is left: so much of it the sensor's noise may be in the widest band
 RATES = (400.0, 200.0, 100.0, 50.0, 25.0)  # per second, of what is kept
 EDGE = 0.1  # s at either end of a record, where smoothing filters have one side only
-PROMISES = 0.5  # of the best share: what promises less is none
+MOST = 5  # candidates that run with the size that was found for them
 BLOCK = 0.5  # s: one of two has the values by which the other is judged
 SENSORS = SensorErrors()  # a model that is judged by its forces has sensors that show them
 
@@ -58,8 +58,16 @@ def drives_by_force(model: Model) -> bool:
     return model.kind != "hydraulic" and all(model.library[name].slot != "loop" for name in model.effects)
 
 
+def follows_from_motion(effect: Effect) -> bool:
+    """Whether an effect is a force, and no part of what drives it."""
+    return effect.slot == "force" and effect.kernel is not None and "actuator_force" not in arguments(effect.kernel)
+
+
 def force_shares(model: Model, records: Sequence[Record], scores: Sequence[CandidateScore]) -> list[ForceShare]:
-    """Of each candidate that comes near the best, in the shape in which it explains most; the largest share first.
+    """Of the best candidates, each in the shape in which it explains most; the largest share first.
+
+    Candidates are forces that follow from the motion. Where a controller closes the loop, the drive answers to what no
+    law gives, and whatever follows from the drive would seem to explain that.
 
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
@@ -77,7 +85,7 @@ def force_shares(model: Model, records: Sequence[Record], scores: Sequence[Candi
     half = np.arange(force.size) // max(round(BLOCK * rate), 1) % 2 == 0
     without = model.with_values(_values(free, bare.change), source="fitted to the forces")
     found = []
-    for one in scores:
+    for one in (s for s in scores if follows_from_motion(s.effect)):
         for start in ({}, one.start, *one.others):
             other = model.with_effect(one.effect.name, {k.partition(".")[2]: v for k, v in start.items()})
             column = _kept(sides, [s.change(other) for s in sides], rate)
@@ -89,8 +97,7 @@ def force_shares(model: Model, records: Sequence[Record], scores: Sequence[Candi
             share = 1.0 - fit.held_out(half) / bare.held_out(half)
             found.append(ForceShare(one.effect.name, share, bare.left**0.5, without, done))
     best = {f.name: f for f in sorted(found, key=lambda f: f.share)}
-    first = max((f.share for f in found), default=0.0)
-    near = [f for f in best.values() if f.share > PROMISES * first]
+    near = list(best.values())[-MOST:]
     # Forces that are not proportional to what an effect's parameters are give less than they promise.
     given = [np.mean(_kept(sides, [s.asked(f.model) for s in sides], rate) ** 2) for f in near]
     kept = [replace(f, share=min(f.share, 1.0 - float(g) / bare.left)) for f, g in zip(near, given, strict=True)]
