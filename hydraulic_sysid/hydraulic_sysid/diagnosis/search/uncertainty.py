@@ -6,7 +6,7 @@ quite the true one; the scatter between records then holds that too. What all re
 law of a library is that of a bench to the last per cent, and an interval is never narrower (a model discrepancy in the
 sense of Kennedy & O'Hagan, J. R. Statist. Soc. B 63 (2001), as a fixed share). The laws of effects are the rougher
 ones, and what shapes them is the roughest. With these shares 89 of 94 intervals of benches with other laws covered the
-truth, and 62 of 67 that they were not chosen on. Numbers of the data sheet that a fit holds
+truth, and 71 of 77 that they were not chosen on. Numbers of the data sheet that a fit holds
 are not exact either: what they may be off within their tolerance moves the parameters, and is in the errors (their
 covariance with all of them free under their priors, less that of the fit).
 """
