@@ -10,8 +10,9 @@ import pytest
 
 from hidden_effects import axis
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.data.records import read_all
+from hydraulic_sysid.data.records import Record, read_all
 from hydraulic_sysid.diagnosis.search import diagnose
+from hydraulic_sysid.diagnosis.search.force_balance import force_shares
 
 MEASURED = os.environ.get("EMPS_DATA", "")  # DATA_EMPS.mat of the nonlinear benchmark
 
@@ -63,6 +64,16 @@ def test_a_sensor_that_shows_every_newton_is_judged_by_the_force(difference, tmp
         assert "forces are compared" in verdict["text"] and verdict["subsystem"] == "force"
         (found,) = (p for p in result["parameters"] if p["key"] == "viscous_asymmetry.difference")
         assert found["value"] == pytest.approx(difference, rel=0.15)
+
+
+def test_forces_are_not_compared_where_nothing_is_free_or_too_short(tmp_path):
+    model, table = model_in(tmp_path), axis.run(np.random.default_rng(4))
+    record = Record.sampled("axis", 1.0 / axis.RATE, {"drive": table["command_V"], "position": table["position_m"]})
+    assert force_shares(model, [record.window(0.0, 0.9)], []) == []
+    fixed = model
+    for key in model.free_keys():
+        fixed = fixed.with_entry(key, free=False)
+    assert not fixed.free_keys() and force_shares(fixed, [record], []) == []
 
 
 @pytest.mark.timeout(300)

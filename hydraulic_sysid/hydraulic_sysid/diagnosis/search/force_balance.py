@@ -34,6 +34,7 @@ NOISY = 0.3  # of the mean square that is left: so much of it the sensor's noise
 RATES = (400.0, 200.0, 100.0, 50.0, 25.0)  # per second, of what is kept
 EDGE = 0.1  # s at either end of a record, where smoothing filters have one side only
 MOST = 5  # candidates that run with the size that was found for them
+SHORTEST = 1.0  # s, of a record
 BLOCK = 0.5  # s: one of two has the values by which the other is judged
 SENSORS = SensorErrors()  # a model that is judged by its forces has sensors that show them
 
@@ -67,12 +68,15 @@ def force_shares(model: Model, records: Sequence[Record], scores: Sequence[Candi
     """Of the best candidates, each in the shape in which it explains most; the largest share first.
 
     Candidates are forces that follow from the motion. Where a controller closes the loop, the drive answers to what no
-    law gives, and whatever follows from the drive would seem to explain that.
+    law gives, and whatever follows from the drive would seem to explain that. None where no parameter is free, or all
+    records are too short.
 
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
-    sides = [_Side.of(model, record, number) for number, record in enumerate(records)]
+    sides = [_Side.of(model, record, number) for number, record in enumerate(records) if record.duration >= SHORTEST]
     free = Parameters.of(model, model.free_keys())
+    if not (sides and len(free)):
+        return []
     moved = [
         model.with_values({k: v + STEP * s}) for k, v, s in zip(free.keys, free.values, free.scales, strict=True)
     ]
