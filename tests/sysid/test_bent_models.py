@@ -224,7 +224,7 @@ class TwoNear(CandidateFits):
     FINISHED: ClassVar = {"valve_deadband": 40_090.0, "valve_underlap": 40_010.0}
 
     def __init__(self) -> None:
-        self.say, self._last = lambda text: None, FitSettings()
+        self.say, self._last, self.path = lambda text: None, FitSettings(), []
 
     def set_against_others(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
         return list(near)
