@@ -14,6 +14,7 @@ import numpy as np
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.records import Record, read_records
+from hydraulic_sysid.data.records.paired import paired
 from hydraulic_sysid.diagnosis.calibrate import calibrate
 from hydraulic_sysid.estimation.fit import FitSettings
 from measured.study import MODELS, Check, Row, Source, Work, free_run, rms, said
@@ -90,7 +91,7 @@ def study(data: Path, work: Work) -> list[Row]:
     found = work.verb("diagnose", *words, "--within", 400, into="diagnosed")
     verdict, evidence = said(found)
     test = [read(folder, *which, "A") for which in TEST]
-    fit = [read(folder, *which, chamber) for which in FIT for chamber in "AB"]
+    fit = paired([read(folder, *which, chamber) for which in FIT for chamber in "AB"])  # as every verb reads them
     settings = FitSettings(length=0.5)
     before = calibrate(bare, fit, settings=settings).model
     after = calibrate(before.with_effect("coulomb_friction").with_values({"coulomb_friction.level": 60.0}), fit,
