@@ -82,3 +82,5 @@ def test_the_measured_axis_misses_a_viscous_friction_that_depends_on_direction(t
     result = diagnose(model_in(tmp_path), read_all([MEASURED], "emps")).result
     assert result["verdict"]["kind"] == "missing", result["verdict"]
     assert result["verdict"]["effects"] == ["viscous_asymmetry"], result["verdict"]
+    assert result["verdict"]["subsystem"] == "force", result["verdict"]
+    assert result["effects"][0]["residual_after"] < result["effects"][0]["residual_before"]

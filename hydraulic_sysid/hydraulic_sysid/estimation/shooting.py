@@ -215,17 +215,22 @@ class Shooting:
         states, memories = (inner or self._inner(plant, i)).into(states)
         drive = segments.drive if drive is None else drive
         beside, shown = self._beside(plant, i), segments.shown if plant.begins_shown else None
-        free = beside.clear_of_stops()
-        clear = self._clear[i] if free is not beside else np.ones(len(states), dtype=bool)
+
+        def seen(plant: Plant, own: Mask | slice) -> Array:
+            run = plant.predict(
+                drive, segments.record.dt, segments.first[own], segments.samples - 1, states[own],
+                None if memories is None else memories[own], self._turning[i][own],
+                None if shown is None else (shown[0][own], shown[1]),
+            )  # fmt: skip
+            return np.stack([run[c] for c in segments.channels], axis=-1)
+
+        free, clear = beside.clear_of_stops(), self._clear[i]
+        if free is beside or not clear.any():
+            return seen(beside, slice(None))
+        if clear.all():
+            return seen(free, slice(None))
         found = np.empty((len(states), segments.samples, len(segments.channels)))
-        for own, plant in ((clear, free), (~clear, beside)):
-            if own.any():
-                run = plant.predict(
-                    drive, segments.record.dt, segments.first[own], segments.samples - 1, states[own],
-                    None if memories is None else memories[own], self._turning[i][own],
-                    None if shown is None else (shown[0][own], shown[1]),
-                )  # fmt: skip
-                found[own] = np.stack([run[c] for c in segments.channels], axis=-1)
+        found[clear], found[~clear] = seen(free, clear), seen(beside, ~clear)
         return found
 
     def _inner(self, plant: Plant, i: int) -> Inner:

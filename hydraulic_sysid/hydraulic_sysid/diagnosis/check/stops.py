@@ -48,12 +48,13 @@ def other_stops(model: Model, records: Sequence[Record], length: float) -> list[
     """
     if "stroke" not in model.entries:
         return []
-    touch, opened = TOUCH * model.value("stroke"), _open(Plant(model))
+    plant = Plant(model)
+    touch, opened = TOUCH * model.value("stroke"), _open(plant)
     smooth = [_smoothed(r, length) for r in records]
     judged = [x[unjudged(r) :] for x, r in zip(smooth, records, strict=True)]
     ends = min(float(x.min()) for x in judged), max(float(x.max()) for x in judged)
     found = []
-    for side, stop, end in zip((-1.0, 1.0), readings_at_stops(Plant(model), records[0].dt), ends, strict=True):
+    for side, stop, end in zip((-1.0, 1.0), readings_at_stops(plant, records[0].dt), ends, strict=True):
         near = [side * (x - end) > -2.0 * touch for x in smooth]
         rests = [
             (r, slice(a, b))

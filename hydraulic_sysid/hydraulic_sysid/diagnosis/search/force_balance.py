@@ -9,7 +9,7 @@ Khalil, Proc. IEEE Int. Conf. Robotics and Automation 1990, 1027–1032).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,6 @@ from hydraulic_sysid.diagnosis.locate.balances import Balances
 from hydraulic_sysid.diagnosis.locate.sensor_errors import SensorErrors
 from hydraulic_sysid.diagnosis.locate.whitening import decimate
 from hydraulic_sysid.estimation.parameters import Parameters
-from hydraulic_sysid.estimation.velocity_filter import VelocityFilter
 
 from .candidates import between
 from .score_test import CandidateScore
@@ -36,6 +35,7 @@ EDGE = 0.1  # s at either end of a record, where smoothing filters have one side
 MOST = 5  # candidates that run with the size that was found for them
 SHORTEST = 1.0  # s, of a record
 BLOCK = 0.5  # s: one of two has the values by which the other is judged
+SOURCE = "fitted to the forces"
 SENSORS = SensorErrors()  # a model that is judged by its forces has sensors that show them
 
 
@@ -77,17 +77,17 @@ def force_shares(model: Model, records: Sequence[Record], scores: Sequence[Candi
     free = Parameters.of(model, model.free_keys())
     if not (sides and len(free)):
         return []
-    moved = [
-        model.with_values({k: v + STEP * s}) for k, v, s in zip(free.keys, free.values, free.scales, strict=True)
-    ]
+    nudged = zip(free.keys, free.values, free.scales, strict=True)
+    moved = [model.with_values({k: v + STEP * scale}) for k, v, scale in nudged]
+    changes = [[s.change(m) for s in sides] for m in moved]
     for rate in RATES:
-        known = np.column_stack([_kept(sides, [s.change(m) for s in sides], rate) for m in moved]) / STEP
+        known = np.column_stack([_kept(sides, change, rate) for change in changes]) / STEP
         force, noise = (_kept(sides, own, rate) for own in ([s.own for s in sides], [s.noise for s in sides]))
         bare = _Fit.of(known, force, (free.low - free.values) / free.scales, (free.high - free.values) / free.scales)
         if np.mean(noise**2) < NOISY * bare.left:
             break
     half = np.arange(force.size) // max(round(BLOCK * rate), 1) % 2 == 0
-    without = model.with_values(_values(free, bare.change), source="fitted to the forces")
+    without, unexplained = model.with_values(_values(free, bare.change), source=SOURCE), bare.held_out(half)
     found = []
     for one in (s for s in scores if follows_from_motion(s.effect)):
         for start in ({}, one.start, *one.others):
@@ -97,8 +97,7 @@ def force_shares(model: Model, records: Sequence[Record], scores: Sequence[Candi
                 continue
             fit = bare.beside(column, one.effect)
             values = {**_values(free, fit.change), **_sized(other, one.effect, float(fit.change[-1]))}
-            done = other.with_values(values, source="fitted to the forces")
-            share = 1.0 - fit.held_out(half) / bare.held_out(half)
+            done, share = other.with_values(values, source=SOURCE), 1.0 - fit.held_out(half) / unexplained
             found.append(ForceShare(one.effect.name, share, bare.left**0.5, without, done))
     best = {f.name: f for f in sorted(found, key=lambda f: f.share)}
     near = list(best.values())[-MOST:]
@@ -164,26 +163,24 @@ def _sized(model: Model, effect: Effect, times: float) -> dict[str, float]:
 class _Side:
     """One record: the force ``own`` (n,) that it asks for beyond a model [N], and the sensor's ``noise`` in it."""
 
+    asked: Callable[[Model], Array]
     record: Record
-    channels: Mapping[str, Array]
-    to_velocity: VelocityFilter
     own: Array
     noise: Array
 
     @classmethod
     def of(cls, model: Model, record: Record, seed: int) -> _Side:
         data = measured(record, Scales.of(model))
-        channels = {name: data.channels[name] for name in ("drive", "position")}
-        noise = data.noise["position"] * np.random.default_rng(seed).standard_normal(len(record))
-        bare = cls(record, channels, data.velocity_filter, np.zeros(1), np.zeros(1))
-        noisy = replace(bare, channels={**channels, "position": channels["position"] + noise})
-        own = bare.asked(model)
-        return replace(bare, own=own, noise=noisy.asked(model) - own)
+        position, std = data.channels["position"], data.noise["position"]
 
-    def asked(self, model: Model) -> Array:
-        """(n,) of a model [N]."""
-        balances = Balances(model, spool_measured=False).with_parameters(self.record.settings)
-        return balances.form(self.channels, self.record.dt, ("force",), self.to_velocity, SENSORS).values[0]
+        def asked(model: Model, position: Array = position) -> Array:
+            balances = Balances(model, spool_measured=False).with_parameters(record.settings)
+            channels = {"drive": data.channels["drive"], "position": position}
+            return balances.form(channels, record.dt, ("force",), data.velocity_filter, SENSORS).values[0]
+
+        own = asked(model)
+        noisy = asked(model, position + std * np.random.default_rng(seed).standard_normal(len(record)))
+        return cls(asked, record, own, noisy - own)
 
     def change(self, model: Model) -> Array:
         """(n,) by how much another model asks for more [N]."""

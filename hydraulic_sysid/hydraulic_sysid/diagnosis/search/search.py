@@ -102,7 +102,7 @@ class Search(RecordingFits):
             return found
 
     def with_force(self, found: SearchResult, model: Model, scores: Sequence[CandidateScore]) -> SearchResult:
-        """The same of these candidates, beside a model; its values and the effect's are what the forces ask for."""
+        """As `by_force`, by these candidates alone beside a model; all values are what the forces ask for."""
         self.say("the force that the motion asks for beyond the model")
         shares = force_shares(model, self.split.records(), scores)
         if not shares or shares[0].share < FURTHER or any(s.share > RIVAL * shares[0].share for s in shares[1:]):
