@@ -152,7 +152,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
             return RECORDING if drive_blamed(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if little:
-        return INDISTINGUISHABLE if tied else MISSING
+        return INDISTINGUISHABLE if tied else OUTSIDE if strained(result) else MISSING
     details = final.variance < SMALL or (bool(curves) and all(c.share < UNATTRIBUTED for c in curves))
     if final.usual > RIGHT and any(c.share > SHOWN for c in curves):
         return OUTSIDE
@@ -179,12 +179,17 @@ def drive_blamed(result: SearchResult) -> bool:
 
 
 def strained(result: SearchResult) -> bool:
-    """Whether shape parameters of effects added ended at a bound: the law had to be bent to its limits to fit."""
+    """Whether shape parameters of effects added ended at a bound: the law had to be bent to its limits to fit.
+
+    A shape that vanishes is no such limit: without it the law is a simpler one.
+    """
     model = result.final.model
     keys = [
         f"{name}.{p.name}" for name in result.added for p in model.library[name].parameters if p.null is None and p.free
     ]
-    return bool(Parameters.of(model, keys).at_bound)
+    shapes = Parameters.of(model, keys)
+    vanishing = [key for key, low in zip(shapes.keys, shapes.low.tolist(), strict=True) if low == 0.0]
+    return any(side == "highest" or key not in vanishing for key, side in shapes.at_bound.items())
 
 
 def place(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str | None:
