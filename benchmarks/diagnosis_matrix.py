@@ -76,7 +76,8 @@ def main(argv: list[str] | None = None) -> int:
         print("nothing was examined yet")
         return 1
     by_setting = matrix.setting_rows(found) if options.family else []
-    print("\n".join([*matrix.rate_rows(found), "", *by_setting, "", *matrix.confusion_rows(found)]))
+    reliability = matrix.reliability_rows(found)
+    print("\n".join([*matrix.rate_rows(found), "", *reliability, "", *by_setting, "", *matrix.confusion_rows(found)]))
     if options.doc:
         PAGE.write_text(matrix.document(matrix.kept(options.out)))
         print(PAGE)

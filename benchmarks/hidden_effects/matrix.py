@@ -227,6 +227,19 @@ def setting_rows(found: list[dict[str, Any]]) -> list[str]:
     return rows + _level_rows("hidden: {}", [(HIDDEN[d["marks"]["kind"]], _right(d)) for d in found])
 
 
+def reliability_rows(found: list[dict[str, Any]]) -> list[str]:
+    """How often verdicts are right, by the probability that they state."""
+    rows = ["| said | on average | verdicts | right | 95 % interval |", "|---|---|---|---|---|"]
+    for low, high, right, count, mean in scoring.reliability([d["marks"] for d in found]):
+        least, most = scoring.wilson(right, count)
+        share = f"{right} = {100 * right / count:.0f} %"
+        rows.append(
+            f"| {100 * low:.0f}…{100 * high:.0f} % | {100 * mean:.0f} % | {count} | {share} "
+            f"| {100 * least:.0f}…{100 * most:.0f} % |"
+        )
+    return rows
+
+
 def _level_rows(title: str, cases: list[tuple[str, bool]]) -> list[str]:
     rows = []
     for level in dict.fromkeys(sorted(level for level, _ in cases)):
@@ -249,7 +262,8 @@ def document(found: list[dict[str, Any]]) -> str:
     lines = ["# Diagnosis on benches with hidden effects", "", *_METHOD, ""]
     if drawn:
         lines += ["## The family of benches", "", *_FAMILY, "", *_made(drawn, _options(drawn)), ""]
-        lines += [*rate_rows(drawn), "", "By setting:", "", *setting_rows(drawn), "", *confusion_rows(drawn), ""]
+        lines += [*rate_rows(drawn), "", *_RELIABILITY, "", *reliability_rows(drawn), ""]
+        lines += ["By setting:", "", *setting_rows(drawn), "", *confusion_rows(drawn), ""]
     if samples:
         lines += ["## The sample benches", "", *_SAMPLES, "", *_made(samples, ""), "", *rate_rows(samples), ""]
         lines += [*_PARAMETERS, "", *confusion_rows(samples), "", *parameter_rows(samples), ""]
@@ -280,6 +294,7 @@ _FAMILY = (
     "data sheet is *off*, areas, dead volumes and supply pressure are wrong by up to 3 % each and carry no bounds. The",
     "seeds were used for nothing else.",
 )
+_RELIABILITY = ("How often verdicts are right, by the probability that they state (a tie: where it names the truth):",)
 _SAMPLES = ("One actuator of 1.5 m, six records of 20 s, white noise.",)
 _PARAMETERS = (
     "A parameter's error is relative to the distance of the true value from the value at which the effect",

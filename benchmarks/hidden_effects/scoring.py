@@ -11,6 +11,7 @@ from typing import Any
 MISSING, TIE, COMPLETE, OUTSIDE = "missing", "indistinguishable", "complete", "outside the library"
 DATA_SHEET, RECORDING = "data sheet", "recording"
 DATUM = "datum"  # kind of a bench with a wrong data sheet
+SURE = 0.95  # probability of a verdict that is said to be sure
 NEAR = 0.10  # of the true value, from the parameter's null
 AS_GOOD = 1.2  # held-out error over that of the true structure
 NULLS = {"sensor_scale.scale": 1.0}
@@ -88,6 +89,10 @@ def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
         marks["right_subsystem"] = result["verdict"]["subsystem"] in answer["subsystems_as_good"][0]
     if answer["kind"] in ("single", "pair"):
         marks["parameters"] = parameters(answer, result)
+    marks["probability"] = result["verdict"].get("probability")
+    # A tie is right where the truth is among what it names.
+    marks["true_among"] = kind == TIE and bool(true) and set(true) <= {*names, *result["verdict"].get("effects", ())}
+    marks["verdict_right"] = bool(marks[RIGHT[answer["kind"]]]) or marks["true_among"]
     return marks
 
 
@@ -138,6 +143,25 @@ def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
 RIGHT = {"none": "silent", "single": "right_first", "pair": "both_found", "unknown": "said_so",
          "datum": "fault_named", "recording": "fault_named"}  # fmt: skip
 
+SAID = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)
+"""Between which probabilities verdicts are counted together, the upper one of each included."""
+
+
+def reliability(marks: list[dict[str, Any]]) -> list[tuple[float, float, int, int, float]]:
+    """Of verdicts with a probability, by bins of it: its bounds, how many are right, how many there are, its mean.
+
+    Bins without any are left out (DeGroot & Fienberg 1983, The Statistician 32).
+    """
+    known = [m for m in marks if m.get("probability") is not None]
+    found = []
+    for low, high in zip(SAID, SAID[1:], strict=False):
+        own = [m for m in known if low < m["probability"] <= high]
+        if own:
+            mean = sum(m["probability"] for m in own) / len(own)
+            found.append((low, high, sum(m["verdict_right"] for m in own), len(own), mean))
+    return found
+
+
 # figure → (title, what is wanted, mark it counts, whether it is the parameters' mark)
 RATES = {
     "right_first": ("one hidden effect: right name first", "≥ 92 %"),
@@ -152,6 +176,8 @@ RATES = {
     "right_subsystem": ("unknown to the library: right subsystem", "≥ 90 %"),
     "near": ("parameters of the named effect within 10 %", "where identifiable"),
     "covered": ("95 % intervals that cover the truth", "≥ 90 %"),
+    "sure": ("verdicts said with 95 % or more: right", "≥ 93 %"),
+    "true_among": ("ties: the truth among them", "≥ 95 %"),
     "as_good": ("held-out error ≤ 1.2 × that of the true structure refitted", "all"),
 }
 
@@ -164,6 +190,10 @@ def rates(marks: list[dict[str, Any]]) -> dict[str, tuple[int, int]]:
             cases = [not m["silent"] for m in marks if "silent" in m]
         elif name in ("near", "covered"):
             cases = [p[name] for m in marks for p in m.get("parameters", [])]
+        elif name == "sure":
+            cases = [m["verdict_right"] for m in marks if (m.get("probability") or 0.0) >= SURE]
+        elif name == "true_among":
+            cases = [m[name] for m in marks if m["verdict"] == TIE and m["true"]]
         elif name == "as_good":
             cases = [m["held_out_ratio"] <= AS_GOOD for m in marks if m.get("held_out_ratio") is not None]
         else:

@@ -82,6 +82,22 @@ def test_pairs_unknowns_and_nothing():
     assert scoring.rates([alarm, quiet])["false_alarms"] == (1, 2)
 
 
+def test_verdicts_are_counted_by_the_probability_that_they_state():
+    def judged(probability: float | None, name="valve_deadband", kind="missing", tied: tuple[str, ...] = ()):
+        found = said(kind, effect(name))
+        found["verdict"] |= {"probability": probability, "effects": [name, *tied]}
+        return scoring.judge(DEADBAND, found)
+
+    marks = [judged(0.96), judged(0.97), judged(0.98, "backlash"), judged(0.6), judged(None)]
+    assert scoring.reliability(marks) == [(0.5, 0.8, 1, 1, 0.6), (0.95, 0.99, 2, 3, pytest.approx(0.97))]
+    assert scoring.rates(marks)["sure"] == (2, 3)
+    ties = [judged(0.96, "backlash", scoring.TIE, ("valve_deadband",)), judged(0.96, "backlash", scoring.TIE)]
+    assert [t["verdict_right"] for t in ties] == [True, False]
+    assert scoring.rates(ties)["true_among"] == (1, 2)
+    rows = matrix.reliability_rows([{"marks": m} for m in marks])
+    assert rows[2:] == ["| 50…80 % | 60 % | 1 | 1 = 100 % | 21…100 % |", "| 95…99 % | 97 % | 3 | 2 = 67 % | 21…94 % |"]
+
+
 def test_wilson_interval():
     low, high = scoring.wilson(9, 10)
     assert (low, high) == (pytest.approx(0.5958, abs=1e-4), pytest.approx(0.9821, abs=1e-4))

@@ -314,7 +314,7 @@ def test_a_small_further_effect_that_may_be_anything_is_not_named(
     one = model.with_effect("stribeck_friction")
     base, before = state(model, 3000 * 5.0, {}), state(one, 3000 * without, {})
     final = state(one.with_effect("external_leakage"), 3000 * 1.1, {})
-    rival = CompetingModel(other, one, before.misfit, 0.0, distinguishable, 1.0)
+    rival = CompetingModel(other, one, before.misfit, 0.0, 21.0 if distinguishable else 20.0, 1.0)
     monkeypatch.setattr(worth, "competing_models", lambda name, state, misfit: [rival])
     misfits = {"stribeck_friction": before.misfit, "external_leakage": final.misfit}
     found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {"external_leakage": before})

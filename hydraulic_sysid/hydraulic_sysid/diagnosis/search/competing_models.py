@@ -14,25 +14,32 @@ from .linearisation import Linearisation
 from .misfit import Misfit
 from .search_state import SearchState
 
-DISTINCT = 30.0  # difference of the sums of squares, of the variance, that distinguishes two models …
+ODDS = 20.0  # from which two models are told apart, …
+DISTINCT = 30.0  # … which this difference of the sums of squares gives, of the variance, …
 LAW = 0.05  # … beside this share of what the better one leaves: no law is quite that of the bench
 _MOST = 5
+_MOST_POWER = 3.0  # of `ODDS`, up to which odds are counted: a fit may have stopped short
 
 
 @dataclass(frozen=True)
 class CompetingModel:
-    """A model with the effect ``name`` in another's place. ``distinguishable``: whether the data decide against it.
+    """A model with the effect ``name`` in another's place.
 
-    ``difference``: how much larger its sum of squares is; ``collinearity``: cosine between what the two effects change
-    in the residuals beyond all free parameters; 1: the same.
+    ``difference``: how much larger its sum of squares is, and ``odds`` of the other against it; ``collinearity``:
+    cosine between what the two effects change in the residuals beyond all free parameters; 1: the same.
     """
 
     name: str
     model: Model
     misfit: Misfit
     difference: float
-    distinguishable: bool
+    odds: float
     collinearity: float
+
+    @property
+    def distinguishable(self) -> bool:
+        """Whether the data decide against it."""
+        return self.odds > ODDS
 
 
 def competing_models(name: str, without: SearchState, final: Misfit) -> list[CompetingModel]:
@@ -44,7 +51,8 @@ def competing_models(name: str, without: SearchState, final: Misfit) -> list[Com
         difference = other.misfit.total - final.total
         cosine = _collinearity(without.linearisation, own, other.refit.model)
         model = other.refit.model
-        found.append(CompetingModel(other.name, model, other.misfit, difference, difference > needed, cosine))
+        odds = ODDS ** float(np.clip(difference / needed, -_MOST_POWER, _MOST_POWER))
+        found.append(CompetingModel(other.name, model, other.misfit, difference, odds, cosine))
     return found
 
 

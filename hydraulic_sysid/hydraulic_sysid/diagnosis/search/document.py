@@ -10,6 +10,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.diagnosis.compare.subject import model_document
 
+from . import posterior
 from . import verdict as verdicts
 from .candidates import subsystem
 from .data_sheet import Deviation
@@ -36,6 +37,8 @@ def document(
     imitations = verdicts.imitated([r for every in records.values() for r in every])
     outside = verdict.kind == OUTSIDE
     explained = final.misfit.variance <= 1.0 + 2.0 * UNSEEN
+    compared = posterior.explanations(result, verdict)
+    text = f"{verdicts.sentences(result, verdict, curves)} {posterior.sentence(compared)}".strip()
     return {
         **heading("diagnose", 2),
         "model": model_document(result.model),
@@ -68,9 +71,11 @@ def document(
             "level": "off" if outside else "explained" if explained and verdict.kind != UNDECIDED else "close",
             "effects": verdict.possible,
             "subsystem": verdicts.place(result, verdict, curves),
-            "text": verdicts.sentences(result, verdict, curves) + verdicts.warning(verdict.possible, imitations),
+            "probability": posterior.probability(compared),
+            "text": text + verdicts.warning(verdict.possible, imitations),
             "imitated": imitations,
         },
+        "explanations": [vars(e) for e in compared],
         "residual": {
             "unit": "residual over noise",
             "before": _residual(result.before_over_noise),
@@ -154,7 +159,9 @@ def added_document(result: SearchResult, known: Mapping[str, Known], confirmed: 
         "level": whole["verdict"]["level"] if confirmed else "off",
         "text": " ".join([text + ("." if confirmed else REFUTED), *verdicts.force_sentences(result, others=False)]),
     }
-    unused = ("competing_models", "nonparametric_curves", "nearest_effects", "proposed_effect", "balances")
+    del whole["verdict"]["probability"]
+    unused = ("explanations", "competing_models", "nonparametric_curves", "nearest_effects", "proposed_effect",
+              "balances")  # fmt: skip
     return {k: v for k, v in whole.items() if k not in unused}
 
 

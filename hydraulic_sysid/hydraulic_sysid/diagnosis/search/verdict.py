@@ -46,7 +46,6 @@ BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to
 UNATTRIBUTED = 0.1  # of what is left: a curve that explains less of it shows no law that is missing
 SHOWN = 0.5  # of what is left: a curve that explains more of it is a law that is missing, where more than …
 RIGHT = 9.0  # … this mean square over noise is left: the laws of effects rightly named left 7.2 at most
-STRAINED = 0.01  # the same where an effect fits only with its shape at the end of what is physical
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
 IN_LINE = ("valve", "sensor")  # subsystems that a signal passes on its way from the command to what is read
 BELOW = 0.9  # residual over noise below which the noise model is doubted
@@ -151,12 +150,14 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
         if not little and result.unexplained_share > UNEXPLAINED:
             return RECORDING if drive_blamed(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
+    if strained(result) and not tied:
+        return OUTSIDE
     if little:
-        return INDISTINGUISHABLE if tied else OUTSIDE if strained(result) else MISSING
+        return INDISTINGUISHABLE if tied else MISSING
     details = final.variance < SMALL or (bool(curves) and all(c.share < UNATTRIBUTED for c in curves))
     if final.usual > RIGHT and any(c.share > SHOWN for c in curves):
         return OUTSIDE
-    allowed = STRAINED if strained(result) else SMALL_UNEXPLAINED if details else BESIDE
+    allowed = SMALL_UNEXPLAINED if details else BESIDE
     if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
         return OUTSIDE
     return INDISTINGUISHABLE if tied else MISSING

@@ -1,0 +1,131 @@
+"""How probable each explanation is: what the search compared, and that the library holds no law that is right.
+
+Posterior odds are prior odds times a Bayes factor (Kass & Raftery, JASA 90 (1995) 773). The factor between two models
+is a power of the difference of their sums of squares, tempered by what no law is right to (`competing_models`), and the
+odds of an unknown law grow with what is left beyond the noise. `Calibration` has the constants, which were chosen on
+benches whose answers are known; how often such probabilities are right on others is measured (diagnosis-matrix.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .competing_models import ODDS
+from .misfit import Misfit
+from .search_state import SearchResult
+from .verdict import COMPLETE, DATA_SHEET, INDISTINGUISHABLE, OUTSIDE, RECORDING, UNDECIDED, Verdict
+
+HIGH = 0.99  # nothing is said to be surer than this
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The constants of `probability_of_unknown`, chosen on 237 benches of the seeds 70001 to 77001.
+
+    With half or double of any of them the mean logarithm of the probability of what came true, −0.268, is no more than
+    0.02 lower.
+    """
+
+    odds: float = ODDS
+    """Of what the search found against a law that the library lacks, where nothing is left beyond the noise."""
+    missed: float = 0.01
+    """Mean square over noise that an estimate of the noise may miss; with it left beyond the noise an unknown law is
+    twice as probable."""
+    laws: float = 1e-3
+    """The same, of the mean square that was explained: no law is quite that of a bench."""
+
+
+CALIBRATION = Calibration()
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Effects that are missing, numbers of the data sheet that are wrong, faults of the recording; and how probable.
+
+    ``named``: whether the verdict says it. Without ``library`` it is that no law of the library is right.
+    """
+
+    probability: float
+    named: bool
+    effects: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+    library: bool = True
+
+
+def explanations(result: SearchResult, verdict: Verdict, calibration: Calibration = CALIBRATION) -> list[Explanation]:
+    """All that was compared, the most probable first; the probabilities add up to 1.
+
+    Nothing where these do not say what is right: the search was ended before it was done, an effect was named by the
+    force it asks for, or what is left is more than noise but nothing to anybody (then the verdict says how much).
+    """
+    final = result.final.misfit
+    settled = verdict.kind in (COMPLETE, DATA_SHEET, RECORDING)
+    if verdict.kind == UNDECIDED or result.by_force is not None or (settled and not final.little):
+        return []
+    unknown = probability_of_unknown(result.before_over_noise, final, calibration)
+    if result.drift is not None and verdict.kind == OUTSIDE:
+        unknown = max(unknown, calibration.odds / (1.0 + calibration.odds))
+    known = _known(result, verdict)
+    total = sum(weight for weight, _ in known)
+    found = [
+        Explanation(
+            (1.0 - unknown) * weight / total, e.named and verdict.kind != OUTSIDE, e.effects, e.numbers, e.faults
+        )
+        for weight, e in known
+    ]
+    none = Explanation(unknown, verdict.kind == OUTSIDE, library=False)
+    return sorted([*found, none], key=lambda e: -e.probability)
+
+
+def probability(found: Sequence[Explanation]) -> float | None:
+    """That a verdict is right: that of all explanations that it names; None where there are none."""
+    return min(sum(e.probability for e in found if e.named), 1.0) if found else None
+
+
+def sentence(found: Sequence[Explanation]) -> str:
+    """What a verdict ends with; empty where there is no probability."""
+    said = probability(found)
+    if said is None:
+        return ""
+    shown = f"over {100.0 * HIGH:.0f} %" if said > HIGH else f"{100.0 * said:.0f} %"
+    return f"The probability of this verdict is {shown}."
+
+
+def probability_of_unknown(before: Misfit, after: Misfit, calibration: Calibration = CALIBRATION) -> float:
+    """That the library lacks the law that is right, by what is left after most was explained."""
+    left, explained = after.variance - 1.0, max(before.variance - after.variance, 0.0)
+    odds = (1.0 + left / (calibration.missed + calibration.laws * explained)) / calibration.odds
+    return odds / (1.0 + odds)
+
+
+def _known(result: SearchResult, verdict: Verdict) -> list[tuple[float, Explanation]]:
+    """What the library, the data sheet and the recording have to say, each with its odds against what was found."""
+    effects, numbers = tuple(result.added), tuple(d.key for d in result.moved)
+    faults = tuple(f.hypothesis.name for f in result.faults)
+    found = [(1.0, Explanation(0.0, True, effects, numbers, faults))]
+
+    def also(effects: Sequence[str], numbers: Sequence[str], faults: Sequence[str], weight: float, named: bool) -> None:
+        one = Explanation(0.0, named, tuple(effects), tuple(numbers), tuple(faults))
+        same = [e for _, e in found if (e.effects, e.numbers, e.faults) == (one.effects, one.numbers, one.faults)]
+        if not same:
+            found.append((weight, one))
+
+    tie = verdict.kind == INDISTINGUISHABLE
+    for name in effects:
+        alike = verdict.family.get(name, ())
+        rivals = {c.name: (c.odds, not c.distinguishable) for c in verdict.competing.get(name, ())}
+        for other, (odds, tied) in {**rivals, **dict.fromkeys(alike, (1.0, True))}.items():
+            also([other if e == name else e for e in effects], numbers, faults, 1.0 / odds, tie and tied)
+    for fault in result.faults_instead:
+        also((), numbers, (*faults, fault.hypothesis.name), 1.0, tie)
+    for d in result.moved:
+        rest = [key for key in numbers if key != d.key]
+        for number in d.alternatives:
+            also(effects, [*rest, number.key], faults, 1.0, True)
+        for effect in d.instead:
+            also([*effects, effect], rest, faults, 1.0, True)
+    if result.numbers_instead:
+        also((), [*numbers, *(d.key for d in result.numbers_instead)], faults, 1.0 / ODDS, False)
+    return found
