@@ -13,7 +13,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.known_starts import KnownStarts
-from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations, bounded_step
 from hydraulic_sysid.estimation.parameters import NO_PRIORS, Parameters, Priors
 
 from .holdout import Split
@@ -78,6 +78,11 @@ class Linearisation:
         ]
         information = self._inner(self.beyond, self.beyond) + np.diag(self.parameters.prior_information)
         return NormalEquations(information, tuple(scores), self.parameters.prior_gradient)
+
+    @cached_property
+    def own_reduction(self) -> float:
+        """By how much a step of the parameters alone would lower the sum of squares, to first order."""
+        return self.normal.reduction(bounded_step(self.normal, self.parameters))
 
     def bordered(
         self,

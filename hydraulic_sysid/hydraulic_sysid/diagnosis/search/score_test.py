@@ -57,7 +57,7 @@ def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures
     """All candidates, the best first; reductions of all segments for fitting, of which a sample is looked at."""
     part, share = at.sample(ENOUGH)
     one = part.of_one_record()
-    _ = part.normal, part.costs, one.normal, one.costs  # once, for all that work at the same time
+    _ = part.own_reduction, part.costs, one.own_reduction, one.costs  # once, for all that work at the same time
     found = list(results(lambda effect: _score(part, one, effect, features), effects))
     scaled = [replace(f, reduction=f.reduction / share) for f in found if f is not None]
     return sorted(scaled, key=lambda f: -f.reduction)
@@ -125,8 +125,7 @@ def _predict(at: Linearisation, model: Model, effect: Effect, group: list[Probe]
     low, high = reach.T
     units = Parameters(tuple(p.moved for p in group), none, one, low, high, none, np.inf * one, np.inf * one)
     change = bounded_step(normal, at.parameters + units)
-    alone = normal.subset(np.arange(own))
-    gain = normal.reduction(change) - alone.reduction(bounded_step(alone, at.parameters))
+    gain = normal.reduction(change) - at.own_reduction
     for p, amount in zip(group, change[own:].tolist(), strict=True):
         start[p.moved] = between(p.null, p.values[p.moved], amount, _parameter(effect, p).default)
     probed = {**start, **{p.moved: p.values[p.moved] for p in group}}
