@@ -85,14 +85,12 @@ from hydraulic_sim.kernels import clamp, smooth_root_gain
 
 {functions}
 
-# Results may be rounded otherwise in the last digit; what is not finite stays so.
-ROUNDING = {"arcp", "contract"}
 # Arrays are copied element by element: a copy of whole arrays has numba compile the message for those that do not fit.
 NR = {n_rates}
 NX = {n_states}
 
 
-@njit("f8(f8, f8, f8, f8)", cache=True, error_model="numpy", fastmath=ROUNDING)
+@njit("f8(f8, f8, f8, f8)", cache=True, error_model="numpy")
 def relax(start, rate, goal, span):
     if rate == 0.0:
         return start
@@ -110,7 +108,7 @@ def rhs(now, S, command, on, P, hydraulic, K, R, G, AUX):
     AUX[9] = direction; AUX[10] = pressure_tank
 
 
-@njit(RUN, cache=True, nogil=True, error_model="numpy", fastmath=ROUNDING)
+@njit(RUN, cache=True, nogil=True, error_model="numpy")
 def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
     """Integrates X over len(drive) samples; Y[k] is what is seen at sample k. Returns the samples done.
 
