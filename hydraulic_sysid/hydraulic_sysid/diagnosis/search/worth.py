@@ -17,7 +17,7 @@ SUBORDINATE = 0.1  # of all that was explained, below which a further effect mus
 LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
 ELSEWHERE = 0.0005  # … and for those of other subsystems
 DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished, …
-SHORT = 2.0  # … or times what the quick refit of the effect itself leaves, which stops as short
+SHORT = 2.0  # … or times by how much the quick refit of the effect itself stops short of its fit
 NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing is left
 PROMISES = 3.0  # times the least reduction that counts, which what takes something off that must gain
 SEEN = 0.0025  # of the residual, by which it must fall where nothing seemed to be left: noise gave 0.09 %, effects 0.35
@@ -76,8 +76,9 @@ def superfluous(base: SearchState, without: SearchState, state: SearchState, nam
 
 def near_competitors(base: SearchState, without: SearchState, state: SearchState, name: str) -> SearchState:
     """The state ``without`` an effect, and of its refits those that come near the state with it."""
-    left = state.misfit.excess + DISTANT * (without.misfit.total - state.misfit.total)
-    left = max([left, *(SHORT * r.misfit.excess for r in without.refits if r.name == name)])
+    far = DISTANT * (without.misfit.total - state.misfit.total)
+    short = [SHORT * (r.misfit.excess - state.misfit.excess) for r in without.refits if r.name == name]
+    left = state.misfit.excess + max([far, *short])
     if explained(base.misfit, state.misfit) < HOPELESS:
         return replace(without, refits=[])
     return replace(without, refits=[r for r in without.others(name) if r.misfit.excess < left])
