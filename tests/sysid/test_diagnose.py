@@ -29,7 +29,13 @@ from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
 from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
 from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
-from hydraulic_sysid.diagnosis.search.worth import absorbs_discrepancy, decisive, nothing_gained, without_competitor
+from hydraulic_sysid.diagnosis.search.worth import (
+    absorbs_discrepancy,
+    decisive,
+    near_competitors,
+    nothing_gained,
+    without_competitor,
+)
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise import code_step
 from hydraulic_sysid.estimation.parameters import bounded, scale
@@ -254,6 +260,39 @@ def test_an_effect_that_explains_nearly_all_may_leave_another(model, after: floa
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     assert verdict.kind_of(found, tied=False) == verdict.MISSING
     assert verdict.kind_of(found, tied=False, curves=[SimpleNamespace(share=share)]) == kind
+
+
+@pytest.mark.parametrize(
+    ("damping", "tied", "kind"),
+    [
+        (0.2, False, verdict.MISSING),
+        (1.0, False, verdict.OUTSIDE),  # nothing swings: a law of another kind is imitated
+        (1.0, True, verdict.INDISTINGUISHABLE),  # another effect does as well without being bent
+        (0.0, False, verdict.MISSING),  # a shape that vanishes is a simpler law
+    ],
+)
+def test_a_law_that_fits_only_bent_to_its_limits_is_not_named(model, damping: float, tied: bool, kind: str) -> None:
+    values = {"mass": 50.0, "frequency": 20.0, "damping": damping}
+    base, final = state(model, 6000.0, {}), state(model.with_effect("structural_flexibility", values), 3000.0, {})
+    misfits = {"structural_flexibility": final.misfit}
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {})
+    assert verdict.kind_of(found, tied=tied) == kind
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "near"),
+    [
+        (3000.0, 3150.0, False),  # beyond two hundredths of what the effect explains
+        (3000.0, 3050.0, True),
+        (3100.0, 3150.0, True),  # the quick refit of the effect itself stopped as short
+        (3100.0, 3250.0, False),
+    ],
+)
+def test_a_quick_refit_is_judged_by_that_of_the_effect_itself(model, own: float, other: float, near: bool) -> None:
+    base, final = state(model, 6000.0, {}), state(model.with_effect("command_delay"), 3000.0, {})
+    without = state(model, 6000.0, {"command_delay": own, "spool_dynamics": other})
+    found = near_competitors(base, without, final, "command_delay").refits
+    assert [r.name for r in found] == ["spool_dynamics"] * near
 
 
 @pytest.mark.parametrize(("explained", "simpler"), [(0.0, False), (5e6, True)])
