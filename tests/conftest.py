@@ -288,9 +288,14 @@ class Client:
         return self.node.create_publisher(kind, topic(name, namespace), profile(name))
 
     def withdraw(self, publisher: Any) -> None:
-        """Destroy a publisher, in the thread that waits for its events: from another one it would fall over it."""
-        self._executor.create_task(self.node.destroy_publisher, publisher)
+        """Destroy a publisher."""
+        self.within(self.node.destroy_publisher, publisher)
+
+    def within(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Call what ends a timer or publisher in the thread that waits for it: from another one that falls over it."""
+        task = self._executor.create_task(function, *arguments)
         self.wake()
+        _wait_until(task.done, f"{function} by the client's own thread")
 
     def call(self, kind: str, name: str, patience: float = PATIENCE_S, **fields: Any) -> Any:
         """Response of a service of type `kind` ("std_srvs/srv/Trigger") at the full name `name`.
@@ -399,7 +404,7 @@ class Source:
 
     def stop(self) -> None:
         """Fall silent."""
-        self._timer.cancel()
+        self._client.within(self._timer.cancel)
 
 
 @pytest.fixture
