@@ -292,7 +292,7 @@ class Client:
         self.within(self.node.destroy_publisher, publisher)
 
     def within(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Call what ends a timer or publisher in the thread that waits for it: from another one that falls over it."""
+        """Call what ends a timer or publisher in the thread that waits for it, which would fall over it otherwise."""
         task = self._executor.create_task(function, *arguments)
         self.wake()
         _wait_until(task.done, f"{function} by the client's own thread")

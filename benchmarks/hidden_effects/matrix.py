@@ -231,12 +231,7 @@ def reliability_rows(found: list[dict[str, Any]]) -> list[str]:
     """How often verdicts are right, by the probability that they state."""
     rows = ["| said | on average | verdicts | right | 95 % interval |", "|---|---|---|---|---|"]
     for low, high, right, count, mean in scoring.reliability([d["marks"] for d in found]):
-        least, most = scoring.wilson(right, count)
-        share = f"{right} = {100 * right / count:.0f} %"
-        rows.append(
-            f"| {100 * low:.0f}…{100 * high:.0f} % | {100 * mean:.0f} % | {count} | {share} "
-            f"| {100 * least:.0f}…{100 * most:.0f} % |"
-        )
+        rows.append(f"| {100 * low:.0f}…{100 * high:.0f} % | {100 * mean:.0f} % {_counted(right, count)}")
     return rows
 
 
@@ -244,10 +239,14 @@ def _level_rows(title: str, cases: list[tuple[str, bool]]) -> list[str]:
     rows = []
     for level in dict.fromkeys(sorted(level for level, _ in cases)):
         right = [hit for name, hit in cases if name == level]
-        low, high = scoring.wilson(sum(right), len(right))
-        share = f"{sum(right)} = {100 * sum(right) / len(right):.0f} %"
-        rows.append(f"| {title.format(level)} | {len(right)} | {share} | {100 * low:.0f}…{100 * high:.0f} % |")
+        rows.append(f"| {title.format(level)} {_counted(sum(right), len(right))}")
     return rows
+
+
+def _counted(right: int, count: int) -> str:
+    """The cells of how many there are, how many of them are right, and the interval of that rate."""
+    low, high = scoring.wilson(right, count)
+    return f"| {count} | {right} = {100 * right / count:.0f} % | {100 * low:.0f}…{100 * high:.0f} % |"
 
 
 def _right(found: dict[str, Any]) -> bool:

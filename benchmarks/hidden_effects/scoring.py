@@ -5,6 +5,7 @@ Knows the schema of a diagnosis (its `verdict`, its ranked `effects`) and nothin
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -154,7 +155,7 @@ def reliability(marks: list[dict[str, Any]]) -> list[tuple[float, float, int, in
     """
     known = [m for m in marks if m.get("probability") is not None]
     found = []
-    for low, high in zip(SAID, SAID[1:], strict=False):
+    for low, high in itertools.pairwise(SAID):
         own = [m for m in known if low < m["probability"] <= high]
         if own:
             mean = sum(m["probability"] for m in own) / len(own)

@@ -61,6 +61,15 @@ def test_why_not_the_runner_up_is_said_with_its_figure(run: Path) -> None:
     assert f"{second['name']} instead of valve_deadband leaves" in found["verdict"]["text"]
 
 
+def test_a_verdict_states_the_probability_of_what_it_names(run: Path) -> None:
+    found = json.loads((run / "diagnose.json").read_text())
+    named = [e for e in found["explanations"] if e["named"]]
+    assert [e["effects"] for e in named] == [["valve_deadband"]]
+    assert 0.5 < found["verdict"]["probability"] == named[0]["probability"] < 1.0
+    assert found["verdict"]["text"].endswith(f"probability of this verdict is {100 * named[0]['probability']:.0f} %.")
+    assert sum(e["probability"] for e in found["explanations"]) == pytest.approx(1.0)
+
+
 def test_the_model_that_was_written_has_the_effect_and_says_where_from(run: Path) -> None:
     model = load_model(run / "model.yaml")
     assert "valve_deadband" in model.effects
@@ -71,7 +80,7 @@ def test_the_model_that_was_written_has_the_effect_and_says_where_from(run: Path
 
 def test_the_page_shows_what_the_document_holds(run: Path) -> None:
     page = (run / "report.html").read_text()
-    for word in ("The error falls", "Before and after", "Competing models", "valve_deadband"):
+    for word in ("The error falls", "Before and after", "Explanations", "Competing models", "valve_deadband"):
         assert word in page
     assert_cannot_inject(json.loads((run / "diagnose.json").read_text()))
 
@@ -258,7 +267,7 @@ def test_add_fits_an_effect_and_says_whether_the_data_bear_it_out(
     command = ["--model", "sample_bench", "--record", *records[:1], "--holdout", records[1], "--json"]
     assert add_main(["valve_deadband", *command, "--out", str(tmp_path / "right")]) == 0
     done = json.loads(capsys.readouterr().out)
-    assert done["verdict"]["kind"] == "confirmed"
+    assert done["verdict"]["kind"] == "confirmed" and "probability" not in done["verdict"]
     assert [r["name"] for r in done["records"] if r["role"] == "validation"]
     assert_cannot_inject(json.loads((tmp_path / "right" / "add.json").read_text()))
     assert done["residual"]["after"]["validation"] < 1.05 < 1.5 < done["residual"]["before"]["validation"]

@@ -18,6 +18,9 @@ from .verdict import COMPLETE, DATA_SHEET, INDISTINGUISHABLE, OUTSIDE, RECORDING
 
 HIGH = 0.99  # nothing is said to be surer than this
 
+What = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+"""Effects, numbers of the data sheet and faults of the recording."""
+
 
 @dataclass(frozen=True)
 class Calibration:
@@ -68,12 +71,9 @@ def explanations(result: SearchResult, verdict: Verdict, calibration: Calibratio
     if result.drift is not None and verdict.kind == OUTSIDE:
         unknown = max(unknown, calibration.odds / (1.0 + calibration.odds))
     known = _known(result, verdict)
-    total = sum(weight for weight, _ in known)
+    share = (1.0 - unknown) / sum(weight for weight, _ in known.values())
     found = [
-        Explanation(
-            (1.0 - unknown) * weight / total, e.named and verdict.kind != OUTSIDE, e.effects, e.numbers, e.faults
-        )
-        for weight, e in known
+        Explanation(share * weight, named and verdict.kind != OUTSIDE, *what) for what, (weight, named) in known.items()
     ]
     none = Explanation(unknown, verdict.kind == OUTSIDE, library=False)
     return sorted([*found, none], key=lambda e: -e.probability)
@@ -100,32 +100,25 @@ def probability_of_unknown(before: Misfit, after: Misfit, calibration: Calibrati
     return odds / (1.0 + odds)
 
 
-def _known(result: SearchResult, verdict: Verdict) -> list[tuple[float, Explanation]]:
-    """What the library, the data sheet and the recording have to say, each with its odds against what was found."""
+def _known(result: SearchResult, verdict: Verdict) -> dict[What, tuple[float, bool]]:
+    """What the library, the data sheet and the recording have to say: its odds against what was found, and if named."""
     effects, numbers = tuple(result.added), tuple(d.key for d in result.moved)
     faults = tuple(f.hypothesis.name for f in result.faults)
-    found = [(1.0, Explanation(0.0, True, effects, numbers, faults))]
-
-    def also(effects: Sequence[str], numbers: Sequence[str], faults: Sequence[str], weight: float, named: bool) -> None:
-        one = Explanation(0.0, named, tuple(effects), tuple(numbers), tuple(faults))
-        same = [e for _, e in found if (e.effects, e.numbers, e.faults) == (one.effects, one.numbers, one.faults)]
-        if not same:
-            found.append((weight, one))
-
+    found: dict[What, tuple[float, bool]] = {(effects, numbers, faults): (1.0, True)}
     tie = verdict.kind == INDISTINGUISHABLE
     for name in effects:
-        alike = verdict.family.get(name, ())
-        rivals = {c.name: (c.odds, not c.distinguishable) for c in verdict.competing.get(name, ())}
-        for other, (odds, tied) in {**rivals, **dict.fromkeys(alike, (1.0, True))}.items():
-            also([other if e == name else e for e in effects], numbers, faults, 1.0 / odds, tie and tied)
+        rivals = {c.name: (1.0 / c.odds, tie and not c.distinguishable) for c in verdict.competing.get(name, ())}
+        for other, said in {**rivals, **dict.fromkeys(verdict.family.get(name, ()), (1.0, tie))}.items():
+            found.setdefault((tuple(other if e == name else e for e in effects), numbers, faults), said)
     for fault in result.faults_instead:
-        also((), numbers, (*faults, fault.hypothesis.name), 1.0, tie)
+        found.setdefault(((), numbers, (*faults, fault.hypothesis.name)), (1.0, tie))
     for d in result.moved:
-        rest = [key for key in numbers if key != d.key]
+        rest = tuple(key for key in numbers if key != d.key)
         for number in d.alternatives:
-            also(effects, [*rest, number.key], faults, 1.0, True)
+            found.setdefault((effects, (*rest, number.key), faults), (1.0, True))
         for effect in d.instead:
-            also([*effects, effect], rest, faults, 1.0, True)
+            found.setdefault(((*effects, effect), rest, faults), (1.0, True))
     if result.numbers_instead:
-        also((), [*numbers, *(d.key for d in result.numbers_instead)], faults, 1.0 / ODDS, False)
+        every = (*numbers, *(d.key for d in result.numbers_instead))
+        found.setdefault(((), every, faults), (1.0 / ODDS, False))
     return found

@@ -189,8 +189,8 @@ def strained(result: SearchResult) -> bool:
         f"{name}.{p.name}" for name in result.added for p in model.library[name].parameters if p.null is None and p.free
     ]
     shapes = Parameters.of(model, keys)
-    vanishing = [key for key, low in zip(shapes.keys, shapes.low.tolist(), strict=True) if low == 0.0]
-    return any(side == "highest" or key not in vanishing for key, side in shapes.at_bound.items())
+    lowest = dict(zip(shapes.keys, shapes.low.tolist(), strict=True))
+    return any(side == "highest" or lowest[key] != 0.0 for key, side in shapes.at_bound.items())
 
 
 def place(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str | None:

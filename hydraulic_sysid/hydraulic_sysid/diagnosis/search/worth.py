@@ -76,11 +76,11 @@ def superfluous(base: SearchState, without: SearchState, state: SearchState, nam
 
 def near_competitors(base: SearchState, without: SearchState, state: SearchState, name: str) -> SearchState:
     """The state ``without`` an effect, and of its refits those that come near the state with it."""
+    if explained(base.misfit, state.misfit) < HOPELESS:
+        return replace(without, refits=[])
     far = DISTANT * (without.misfit.total - state.misfit.total)
     short = [SHORT * (r.misfit.excess - state.misfit.excess) for r in without.refits if r.name == name]
     left = state.misfit.excess + max([far, *short])
-    if explained(base.misfit, state.misfit) < HOPELESS:
-        return replace(without, refits=[])
     return replace(without, refits=[r for r in without.others(name) if r.misfit.excess < left])
 
 
