@@ -22,6 +22,7 @@ from hydraulic_sysid.diagnosis.search.posterior import (
     probability_of_unknown,
     sentence,
 )
+from hydraulic_sysid.diagnosis.search.remainder import Remainder
 from hydraulic_sysid.diagnosis.search.search_state import SearchResult, SearchState
 from hydraulic_sysid.diagnosis.search.verdict import (
     COMPLETE,
@@ -132,5 +133,13 @@ def test_outside_the_library_is_that_none_of_these_is_right(model: Model) -> Non
     ("kind", "after"), [(UNDECIDED, 1.0), (COMPLETE, 2.0)], ids=["ended early", "more than noise, nothing to anybody"]
 )
 def test_no_probability_is_stated_where_it_says_nothing(model: Model, kind: str, after: float) -> None:
-    found = explanations(result(model, after, after), verdict(kind))
+    ended = result(model, after, after)
+    ended.__dict__["remainders"] = [Remainder("position", 1e-6, 1e-6, 1.0)]
+    found = explanations(ended, verdict(kind))
     assert found == [] and probability(found) is None and sentence(found) == ""
+
+
+def test_a_number_that_leaves_much_of_the_motion_is_improbable(model: Model) -> None:
+    ended = replace(result(model, 100.0, 2.5), moved=(Deviation("supply_pressure", 14e6, 13.5e6, 1e4, 500.0),))
+    ended.__dict__["remainders"] = [Remainder("position", 0.1, 0.1, 1.0)]
+    assert 0.5 < cast(float, probability(explanations(ended, verdict(DATA_SHEET)))) < 0.75

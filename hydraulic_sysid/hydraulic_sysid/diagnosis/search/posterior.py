@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from .competing_models import ODDS
 from .misfit import Misfit
+from .remainder import immaterial
 from .search_state import SearchResult
 from .verdict import COMPLETE, DATA_SHEET, INDISTINGUISHABLE, OUTSIDE, RECORDING, UNDECIDED, Verdict
 
@@ -65,7 +66,8 @@ def explanations(result: SearchResult, verdict: Verdict, calibration: Calibratio
     """
     final = result.final.misfit
     settled = verdict.kind in (COMPLETE, DATA_SHEET, RECORDING)
-    if verdict.kind == UNDECIDED or result.by_force is not None or (settled and not final.little):
+    moot = settled and not final.little and immaterial(final, result.remainders)
+    if verdict.kind == UNDECIDED or result.by_force is not None or moot:
         return []
     unknown = probability_of_unknown(result.before_over_noise, final, calibration)
     if result.drift is not None and verdict.kind == OUTSIDE:
