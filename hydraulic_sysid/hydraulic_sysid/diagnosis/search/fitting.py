@@ -39,6 +39,7 @@ FEW_STEPS = 6  # of a fit to those that only sets effects against each other, at
 FEW_GAIN = 2e-3  # … and while a step lowers the sum of squares by this share
 LOOK = 20  # segments, spread over all records, that show where a fit from other values leads, …
 SAME_LOOK = 0.02  # … where what noise does not explain falls by no more than this share: nowhere else
+FINE_LOOK = 0.2  # of what must be gained there: steps that gain less end such a fit
 SHORTER = 4  # times: segments from which a fit that is far off begins once more
 FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
 BEYOND = 8  # values of a number that lay at its bound, over all where it may go, from which a fit may begin
@@ -246,11 +247,12 @@ class Fitting:
         before = self.left_on_few(state)
         values = sum(int(s.counted.sum()) for s in self.split.some(LOOK))
         needed = SIGNIFICANT * max(1.0, before / values) + SAME_LOOK * max(before - values, 0.0)
-        return before - self.looked_at(model) > needed
+        return before - self.looked_at(model, FINE_LOOK * needed / before) > needed
 
-    def looked_at(self, model: Model) -> float:
-        """What a fit to a few segments leaves of them."""
-        return self.fitted_to(self.split.some(LOOK), model, self._last).cost
+    def looked_at(self, model: Model, least_gain: float = LAST_GAIN) -> float:
+        """What a fit to a few segments, while a step gains that share, leaves of them."""
+        settings = replace(self._last, least_gain=max(least_gain, LAST_GAIN))
+        return self.fitted_to(self.split.some(LOOK), model, settings).cost
 
     def left_on_few(self, state: SearchState) -> float:
         """What a state leaves of the same segments."""
