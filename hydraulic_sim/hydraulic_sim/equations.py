@@ -47,9 +47,11 @@ if hydraulic:
     compliance_a = volume_a / bulk_modulus
     compliance_b = volume_b / bulk_modulus
     {compliance}
-    K[2] = (flow_a - piston_area_a * velocity) / compliance_a
-    K[3] = (flow_b + piston_area_b * velocity) / compliance_b
-    pressure_rate = max(slope_a / compliance_a, slope_b / compliance_b)
+    stiffness_a = 1.0 / compliance_a
+    stiffness_b = 1.0 / compliance_b
+    K[2] = (flow_a - piston_area_a * velocity) * stiffness_a
+    K[3] = (flow_b + piston_area_b * velocity) * stiffness_b
+    pressure_rate = max(slope_a * stiffness_a, slope_b * stiffness_b)
     actuator_force = pressure_a * piston_area_a - pressure_b * piston_area_b
 else:
     opening = spool
