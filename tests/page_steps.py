@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import Any
@@ -10,9 +9,7 @@ from typing import Any
 import pytest
 
 PATIENCE_MS = 300_000  # a diagnosis on a slow machine that runs other tests beside: 180 s have been seen
-thorough = pytest.mark.skipif(
-    "BENCH_BROWSER" not in os.environ, reason="minutes beside a bench by the wall clock: BENCH_BROWSER=1 runs it"
-)
+thorough = pytest.mark.thorough  # minutes beside a bench by the wall clock
 
 
 def until(page: Any, condition: str, argument: Any = None) -> Any:

@@ -397,11 +397,20 @@ def test_all_tests_run_those_of_the_wall_clock_last_and_the_closing_line_sums_up
     assert [call for call in calls if not call.startswith("-c ")] == [
         "-m ruff check .",
         "-m mypy",
-        "-m pytest -m not timing -p xdist --dist=loadfile --no-loadscope-reorder tests",
+        "-m pytest -m not timing and not thorough -p xdist --dist=loadfile --no-loadscope-reorder tests",
         "-m pytest -m timing tests/pump/test_pace.py",
     ]
     assert answer.stdout.count("collected 2 items") == 2
     assert answer.stdout.splitlines()[-1].startswith("=== 4 passed, 2 warnings in ")
+
+
+def test_thorough_tests_are_left_out_and_said_to_be_but_for_the_option(built: FakeCheckout) -> None:
+    assert "./bench test --thorough" in built.bench("test").stdout
+    answer = built.bench("test", "--thorough")
+    assert answer.returncode == 0, answer.stderr
+    (whole,) = (call for call in built.calls()[4:] if call.endswith(" tests") and "-m timing" not in call)
+    assert "thorough" not in whole and "-m not timing" in whole
+    assert "--thorough" not in answer.stdout
 
 
 def test_test_with_arguments_runs_only_pytest(built: FakeCheckout) -> None:
@@ -470,7 +479,7 @@ def test_tests_that_somebody_asks_for_may_take_as_long_as_they_do(
     assert test_verb.Pytest(slow, tmp_path, dict(os.environ)).code != 0
 
 
-@pytest.mark.parametrize("marker", ["not timing", "timing"])
+@pytest.mark.parametrize("marker", ["not timing and not thorough", "timing"])
 def test_whichever_run_fails_fails_the_test(built: FakeCheckout, marker: str) -> None:
     leaks = built.bench("test", LEAKS=marker)
     assert leaks.returncode == 1

@@ -160,7 +160,10 @@ def test_lifecycle_live_gains_and_stale_states(plant: Any, node: Any, client: An
 
 @pytest.mark.parametrize(
     "effects",
-    ["{valve_deadband: {width: 0.02}}", "{supply_droop: {resistance: 4.0e9, time: 0.1}}"],
+    [
+        "{valve_deadband: {width: 0.02}}",
+        pytest.param("{supply_droop: {resistance: 4.0e9, time: 0.1}}", marks=pytest.mark.thorough),
+    ],
     ids=["deadband", "droop"],
 )
 def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(

@@ -15,7 +15,7 @@ from hydraulic_sysid.diagnosis.search import diagnose
 SECONDS = 10.0
 RIGHT_FIRST = (
     benches.Bench("single", ("coulomb_friction",), "strong", 1),
-    benches.Bench("single", ("valve_deadband",), "mild", 1),
+    pytest.param(benches.Bench("single", ("valve_deadband",), "mild", 1), marks=pytest.mark.thorough),
 )
 
 
@@ -40,6 +40,7 @@ def test_the_hidden_effect_is_named_first(bench, tmp_path):
     assert marks["parameters"], marks
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(600)
 def test_the_step_of_a_coarse_sensor_is_read_off_its_readings(tmp_path):
     """It is seen and not fitted, so it has no interval."""
@@ -64,6 +65,7 @@ def test_nothing_is_named_where_nothing_is_missing(tmp_path):
     assert marks["silent"], marks
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(600)
 def test_what_no_library_lists_is_said_to_be_outside(tmp_path):
     marks = examined(benches.Bench("unknown", ("worn_barrel_leakage",), "strong", 1), tmp_path)

@@ -683,6 +683,7 @@ def test_a_parameter_that_the_file_fixes_does_not_move(model) -> None:
     assert movable - set(fixed.movable_keys()) == {"moving_mass", "orifice_transition"}
 
 
+@pytest.mark.thorough
 def test_dry_friction_of_a_light_piston_is_looked_for(model) -> None:
     """The library's 450 N on 1.3 kg ask for steps that no fit follows; 60 N do not."""
     light = model.without_effect("coulomb_friction").with_values(

@@ -153,6 +153,7 @@ def test_one_effect_is_simpler_than_two_numbers_that_say_the_same(model: Model, 
     assert found["residual"]["after"]["validation"] < 1.05
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("effect", "size"), [("hose_compliance", 0.4), ("sensor_offset", 0.4)])
 def test_one_effect_is_simpler_beside_numbers_that_are_wrong(model: Model, effect: str, size: float) -> None:
     """Only some of the numbers that would explain the records are there for the effect."""
@@ -180,6 +181,7 @@ def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> Non
     assert_cannot_inject(found)
 
 
+@pytest.mark.thorough
 def test_pressures_that_are_a_little_late_beside_an_effect_are_no_further_effect(model: Model) -> None:
     """The effect hides them at first: what all channels but the position show is then like a slower valve."""
     runs = driven(model.with_effect("sensor_delay", {"delay": 0.012}))
@@ -208,6 +210,7 @@ def test_what_was_found_is_the_best_so_far_where_the_time_ends_in_what_follows(
     assert found.final.model.effects == known.model.effects
 
 
+@pytest.mark.thorough
 def test_slow_transducers_are_a_matter_of_the_recording(model: Model, runs) -> None:
     """They ring on from one segment into the next."""
     lag = 0.01
@@ -258,6 +261,7 @@ def test_few_spikes_are_an_accident(count: int, said: str) -> None:
     assert sentence.startswith(said)
 
 
+@pytest.mark.thorough
 def test_noise_on_the_recorded_drive_is_a_matter_of_the_recording(model: Model, runs) -> None:
     draw, noisy = np.random.default_rng(3), []
     for record in records(runs):

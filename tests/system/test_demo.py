@@ -196,7 +196,7 @@ def excited(run: Demo, wait_until: Callable[..., Any], log: str = "excitation_ch
     wait_until(started, f"the excitation to start ({log})", PATIENCE_S)
 
 
-@pytest.mark.parametrize("node", ["recorder", "excitation"])
+@pytest.mark.parametrize("node", ["recorder", pytest.param("excitation", marks=pytest.mark.thorough)])
 def test_a_node_that_dies_fails_its_step_and_ends_the_run(demo: Any, wait_until: Any, node: str) -> None:
     run = demo("--quick", "--no-lockstep")  # which leaves time to kill it
     excited(run, wait_until)
@@ -243,6 +243,7 @@ def test_a_plant_that_cannot_start_is_told_at_once(demo: Any, tmp_path: Path) ->
     assert run.processes() == {}
 
 
+@pytest.mark.thorough
 def test_records_of_ones_own_need_no_graph(tmp_path: Path) -> None:
     run = finished(Demo.start(tmp_path, "--record", str(SAMPLE), "--model", "sample_bench"))
     assert run.code == 0, run.errors

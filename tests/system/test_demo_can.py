@@ -16,7 +16,7 @@ from hydraulic_sysid.data.records import read_records
 from hydraulic_sysid.estimation.metrics import best_fit
 
 pytest.importorskip("rclpy")
-pytestmark = pytest.mark.timeout(PATIENCE_S + 60.0)
+pytestmark = [pytest.mark.timeout(PATIENCE_S + 60.0), pytest.mark.thorough]
 
 AS_BUILT = Path(str(resources.files("hydraulic_bringup.demo") / "models" / "as_built.yaml"))
 

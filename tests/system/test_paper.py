@@ -16,7 +16,7 @@ from hydraulic_sysid.excitation import load_plan
 
 pytest.importorskip("rclpy")
 
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.timeout(900), pytest.mark.thorough]
 
 
 @pytest.fixture(scope="module")

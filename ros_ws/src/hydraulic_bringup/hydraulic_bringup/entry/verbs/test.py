@@ -1,8 +1,9 @@
-"""test [PYTEST ARG …]: build, ruff, mypy and all tests; with arguments only pytest on those.
+"""test [--thorough | PYTEST ARG …]: build, ruff, mypy and the tests; with arguments only pytest on those.
 
-The tests fill all processors; those of the wall clock (marker `timing`) run after all others, one after the other, and
-only they are repeated, once, where they fail. The last line printed is the sum of pytest's closing lines. Exit code 0
-only if everything passed.
+Tests that take long and find what another one or a benchmark finds too (marker `thorough`) are left out, but for
+--thorough. The tests fill all processors; those of the wall clock (marker `timing`) run after all others, one after the
+other, and only they are repeated, once, where they fail. The last line printed is the sum of pytest's closing lines.
+Exit code 0 only if everything passed.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ ORDER = 2
 CHECKS = ("ruff", "check", "."), ("mypy",)
 COMPILE = "from hydraulic_sim import model_file, plant; plant.Plant(model_file.load_model('sample_bench'))"
 FAILED_TESTS = 1  # pytest's exit code; others mean that it was not able to run them
-LONGEST_S = 2400.0  # about three times what two processors take; what hangs beyond it is interrupted and has failed
+THOROUGH = "--thorough"
+LONGEST_S = 2400.0  # of a run on two processors, with a margin; what hangs beyond it is interrupted and has failed
+LONGEST_THOROUGH_S = 7200.0
 INTERRUPT_S = 15.0  # for pytest to end its node processes and to sum up
 COUNT = re.compile(r"(\d+) (passed|failed|errors?|skipped|xfailed|xpassed|repeated|warnings?)\b")
 
@@ -38,10 +41,11 @@ def run(bench: Bench, arguments: list[str]) -> int:
     if arguments in (["-h"], ["--help"]):
         print(f"usage: ./bench {__doc__}")
         return 0
+    thorough = arguments == [THOROUGH]
     bench.prepare()
     root, variables = bench.checkout.root, bench.variables()
     python = [str(bench.checkout.python), "-m"]
-    if arguments:
+    if arguments and not thorough:
         here = Path.cwd() if root in Path.cwd().parents else root  # so that given paths mean what they say
         return Pytest([*python, "pytest", *arguments], here, variables, longest=threading.TIMEOUT_MAX).code
     variables.pop("PYTHONDONTWRITEBYTECODE", None)  # each of hundreds of processes would compile all that it imports
@@ -60,13 +64,17 @@ def run(bench: Bench, arguments: list[str]) -> int:
         # Only these, as it takes long to collect all.
         files = sorted(root.glob("tests/**/*.py"))
         timed = [str(file.relative_to(root)) for file in files if "mark.timing" in file.read_text("utf-8")] or ["tests"]
+        usual = "not timing" if thorough else "not timing and not thorough"
+        longest = LONGEST_THOROUGH_S if thorough else None
         runs = [
-            Pytest([*pytest, "not timing", *spread, "tests"], root, variables),
+            Pytest([*pytest, usual, *spread, "tests"], root, variables, longest),
             Pytest([*pytest, "timing", *timed], root, variables),
         ]
         if runs[-1].code == FAILED_TESTS:
             runs[-1].repeated = True
             runs.append(Pytest([*pytest, "timing", *timed, "--last-failed"], root, variables))
+    if not thorough:
+        print(f"Left out, since they take long: the tests marked thorough (./bench test {THOROUGH}).")
     bad = [one for one in runs if one.code and not one.repeated]
     if failed or bad:
         print("Failed, see above:", *failed, *(one.closing for one in bad), sep="\n  ")
