@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 from .candidates import subsystem
+from .competing_models import odds
 from .misfit import Misfit
 from .score_test import CandidateScore
 from .search_state import CandidateRefit, SearchState
@@ -16,16 +16,16 @@ NOTHING = ""
 
 
 def probabilities(base: Misfit, refits: Sequence[tuple[str, int, Misfit]]) -> dict[str, float]:
-    """Posterior probability of each candidate (name, number of parameters, misfit) and of `NOTHING`; equal priors.
+    """Probability of each candidate (name, number of parameters, misfit) and of `NOTHING`, before the search has ended.
 
-    exp(−BIC/2), normalised (Schwarz, Ann. Stat. 6, 1978; Kass & Raftery, JASA 90, 1995): given that one of these is
-    right, and with the variance that the best of them leaves. Where no law is quite the bench's, it is too sure.
+    Given that one of these is right, equally probable beforehand, by the odds with which a verdict tells models apart
+    (`competing_models.odds`); each parameter costs what BIC gives it (Schwarz, Ann. Stat. 6 (1978) 461).
     """
     every = [(NOTHING, 0, base), *refits]
-    variance = min(misfit.variance for _, _, misfit in every)
-    bic = {name: misfit.total / variance + count * math.log(max(misfit.count, 2)) for name, count, misfit in every}
-    least = min(bic.values())
-    weight = {name: math.exp(-0.5 * min(value - least, 1400.0)) for name, value in bic.items()}
+    best = min((misfit for _, _, misfit in every), key=lambda m: m.total)
+    left = {name: misfit.total + count * best.freedom for name, count, misfit in every}
+    least = min(left.values())
+    weight = {name: 1.0 / odds(best, value - least) for name, value in left.items()}
     total = sum(weight.values())
     return {name: value / total for name, value in weight.items()}
 

@@ -42,17 +42,21 @@ class CompetingModel:
         return self.odds > ODDS
 
 
+def odds(misfit: Misfit, difference: float) -> float:
+    """Of a model that leaves ``misfit`` against one that leaves this ``difference`` more of the sum of squares."""
+    needed = DISTINCT * misfit.variance + LAW * misfit.excess
+    return float(ODDS ** np.clip(difference / needed, -_MOST_POWER, _MOST_POWER))
+
+
 def competing_models(name: str, without: SearchState, final: Misfit) -> list[CompetingModel]:
     """The competitors of ``name``, whose place in the fitted model is empty in ``without``; the closest first."""
     own = next((r.refit.model for r in without.refits if r.name == name), None)
-    needed = DISTINCT * final.variance + LAW * final.excess
     found = []
     for other in without.others(name)[:_MOST]:
         difference = other.misfit.total - final.total
         cosine = _collinearity(without.linearisation, own, other.refit.model)
         model = other.refit.model
-        odds = ODDS ** float(np.clip(difference / needed, -_MOST_POWER, _MOST_POWER))
-        found.append(CompetingModel(other.name, model, other.misfit, difference, odds, cosine))
+        found.append(CompetingModel(other.name, model, other.misfit, difference, odds(final, difference), cosine))
     return found
 
 
