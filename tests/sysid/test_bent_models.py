@@ -26,6 +26,7 @@ from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
 from hydraulic_sysid.diagnosis.search.score_test import score
 from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
+from hydraulic_sysid.diagnosis.search.spectral_lines import record_features
 from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
 from hydraulic_sysid.diagnosis.search.worth import anything
 from hydraulic_sysid.estimation.fit import FitSettings
@@ -58,6 +59,20 @@ def test_a_probe_that_goes_too_far_is_tried_nearer(model: Model) -> None:
     at = Linearisation.of(model, split([record], [], model, 0.5))
     (found,) = score(at, [model.library["hose_compliance"]], RecordFeatures())
     assert found.start["hose_compliance.capacity"] == pytest.approx(CAPACITY, rel=0.3)  # by usual sizes a tenth of it
+
+
+@pytest.mark.parametrize(("codes", "sensor"), [(4096, False), (1500, True)])
+def test_steps_of_all_channels_are_a_converter_but_for_a_position_that_is_coarser(
+    model: Model, codes: int, sensor: bool
+) -> None:
+    """The pressures have some 3500 codes over the supply pressure."""
+    run = swept(model)
+    pressure = model.value("supply_pressure") / 3500
+    step = {"position": model.value("stroke") / codes, "pressure_a": pressure, "pressure_b": pressure}
+    channels = {c: np.round(np.asarray(run[c]) / s) * s for c, s in step.items()}
+    record = Record("coarse", np.asarray(run.time), DT, {"drive": run["drive"], **channels})
+    seen = record_features(Linearisation.of(model, split([record], [], model, 0.5)))
+    assert seen.resolution == (pytest.approx(step["position"], rel=1e-4) if sensor else 0.0)
 
 
 def test_a_limit_that_is_reached_far_from_where_it_is_looked_for_is_found(model: Model) -> None:

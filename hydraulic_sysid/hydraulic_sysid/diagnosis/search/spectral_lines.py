@@ -24,6 +24,7 @@ _FINER = 4  # zero padding: bins between those of a record
 _BESIDE = 3.0  # Hz, within which side bands of a line lie
 _MOST = 2
 _VISIBLE = 0.3  # of a channel's noise, from which its steps are no mere rounding of a file
+_COARSER = 0.6  # of the codes of the pressures' converters, below which a position has a coarse sensor of its own
 _MOST_BINS = 1_000_000
 _SLOWEST = 2.0  # Hz, slower is drift within a segment
 
@@ -32,17 +33,25 @@ def record_features(at: Linearisation) -> RecordFeatures:
     """Lines, the step between position readings that all records share (0 where they have none), and the stroke."""
     steps = [code_step(s.record["position"]) for s in at.split.segments]
     shared = float(np.median(steps)) if max(steps) < 1.01 * min(steps) else 0.0
-    if any(_converted(s) for s in at.split.segments):
-        shared = 0.0
-    stroke = at.model.value("stroke") if at.model.kind == "hydraulic" else math.inf
+    hydraulic = at.model.kind == "hydraulic"
+    stroke = at.model.value("stroke") if hydraulic else math.inf
+    if hydraulic and shared > 0.0:
+        codes = stroke / shared, at.model.value("supply_pressure")
+        if any(_converted(s, *codes) for s in at.split.segments):
+            shared = 0.0
     return RecordFeatures(spectral_lines(at.split.segments, at.residual), shared, stroke)
 
 
-def _converted(segments: Segments) -> bool:
-    """Whether the pressures, too, come in steps of about their noise: then a converter makes them, not the sensor."""
+def _converted(segments: Segments, codes: float, supply: float) -> bool:
+    """Whether the pressures, too, come in steps of about their noise: then a converter makes them, not the sensor.
+
+    But not those of a position with far fewer ``codes`` over its stroke than they have over the ``supply`` pressure.
+    """
     others = [c for c in segments.channels if c != "position"]
     noise = dict(zip(segments.channels, segments.noise_std.tolist(), strict=True))
-    return any(code_step(segments.record[c]) > _VISIBLE * noise[c] for c in others)
+    steps = [code_step(segments.record[c]) for c in others]
+    seen = zip(others, steps, strict=True)
+    return any(step > _VISIBLE * noise[c] and codes > _COARSER * supply / step for c, step in seen)
 
 
 def spectral_lines(segments: Sequence[Segments], residuals: Sequence[Array]) -> tuple[float, ...]:
