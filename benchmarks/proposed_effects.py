@@ -4,9 +4,9 @@
 
 Each bench of the independent plant (hidden_effects/) hides one of the catalogue's laws that the library lacks. Its user
 has the records and a model file without it. `diagnose` is asked to propose an effect, which joins the model and is
-fitted. Errors are those on records of the same bench that nothing has seen: of the model as it was, with the proposed
-effect, and of the true structure. That is the same bench, measured under the same noise, with nothing hidden and the
-model refitted to it. With --given the verdict "outside the library" is taken for granted: the library is not searched.
+fitted (`add`, then `calibrate`). Errors are those on records of the same bench that nothing has seen: of the model as
+it was, with the proposed effect, and of the true structure, each refitted by `calibrate`. The last is the same bench,
+measured under the same noise, with nothing hidden. With --given the verdict "outside the library" is taken for granted: the library is not searched.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def line(name: str, row: dict[str, Any]) -> str:
     if row["ratio"] is None:
         return f"{name:42s} {row['said']}"
     return (
-        f"{name:42s} {row['said']:50s} before {row['before']:6.3f}  joined {row['joined']:6.3f}  "
-        f"true {row['true']:6.3f}  ratio {row['ratio']:5.2f}  {row['seconds']:5.0f} s"
+        f"{name:42s} {row['said']:50s} before {row['before']:6.3f}  added {row['added']:6.3f}  "
+        f"refitted {row['joined']:6.3f}  true {row['true']:6.3f}  ratio {row['ratio']:5.2f}  {row['seconds']:5.0f} s"
     )
 
 
@@ -103,12 +103,15 @@ def examined(bench: benches.Bench, names: tuple[str, ...], given: bool) -> dict[
         before = calibrate(model, records, fresh).result["test"]["after"]
         hidden = bench.effects
         true = calibrate(load_model(text), made("plain", hidden), made("plain fresh", hidden, " fresh"))
-        reached, best = evaluate(joined, fresh).rms, true.result["test"]["after"]
+        added = evaluate(joined, fresh).rms
+        refitted = calibrate(joined, records, fresh)
+        reached, best = refitted.result["test"]["after"], true.result["test"]["after"]
     said = f"{effect.place.removeprefix('unknown_')} over {effect.variable}: {effect.law} {effect.share:.2f}"
     seconds = time.process_time() - begin
     return {
         "said": said,
         "before": before,
+        "added": added,
         "joined": reached,
         "true": best,
         "ratio": reached / best,

@@ -25,7 +25,7 @@ from .parallel import results
 from .parameters import NO_PRIORS, Parameters, Priors
 from .projection import Projection
 from .segments import Segments, cut, segment_length
-from .shooting import Shooting, better_of
+from .shooting import Shooting
 
 _SETTLED = 1e-4  # share of a cost below which moving initial states on gains no more
 _ROUNDS = 4  # times that they are moved at most
@@ -37,7 +37,6 @@ _NEARER = 0.8  # of the misfit before: a smaller one lets unmeasured pressures g
 # Of the sum of squares where the directions of the initial states were taken: below, they are taken anew …
 _OUTDATED = 0.8
 _OUTDATED_AT_END = 200.0  # … and where a fit would end, if it has fallen by so many of its least gains
-_LED = 0.7  # of the predicted gain of a step, below which initial states may have begun in the wrong place
 _MILD = 3.0  # residual over noise from which a robust loss counts less than the square
 
 
@@ -107,10 +106,8 @@ class FitPoint:
     @cached_property
     def cost(self) -> float:
         """Sum of squared residuals over noise, or what a robust loss makes of them."""
-        return self._squares(self.projections) + self.parameters.prior_cost
-
-    def _squares(self, projections: Sequence[Projection]) -> float:
-        return float(sum(np.sum(loss(p.residual, self.robust)) for p in projections))
+        squares = sum(np.sum(loss(p.residual, self.robust)) for p in self.projections)
+        return float(squares) + self.parameters.prior_cost
 
     @property
     def costs(self) -> list[Array]:
@@ -170,20 +167,19 @@ class FitPoint:
     def moved(self, change: Array) -> FitPoint | None:
         """A change (P,) of the parameters away; None where the plant does not run there.
 
-        Initial states begin where they will fit best, to first order; where that gains less than was predicted, also
-        where they only follow the parameters: in segments far from linear the former may lead nowhere. The directions
-        in which they act are kept.
+        Initial states begin where they will fit best, to first order, or where they only follow the parameters: in
+        segments far from linear the former may lead nowhere. The directions in which they act are kept.
         """
         shooting, steps = self.shooting, [c @ change for c in self.columns]
         parameters = self.parameters.moved(change)
         plant = shooting.plant.with_parameters(parameters.by_key)
-        ahead = [p.raw + s for p, s in zip(self.projections, steps, strict=True)]
+        starts = [
+            shooting.corrected(self.initial_states, self.projections, ahead)
+            for ahead in (steps, [p.raw + s for p, s in zip(self.projections, steps, strict=True)])
+        ]
         try:
-            reached = shooting.reached(plant, self.initial_states, self.projections, ahead)
-            gained = self.cost - self._squares(reached[1]) - parameters.prior_cost
-            if gained < _LED * self.normal.reduction(change):
-                reached = better_of(shooting.reached(plant, self.initial_states, self.projections, steps), reached)
-            initial_states, projections = shooting.improved(plant, *reached)
+            states, before = shooting.better(plant, self.projections, *starts)
+            initial_states, projections = shooting.improved(plant, states, before)
         except SimulationError:
             return None
         there = replace(

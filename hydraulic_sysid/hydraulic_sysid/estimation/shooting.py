@@ -145,15 +145,12 @@ class Shooting:
             states, best = better_of((states, best), (moved, self._seen_from(before, plant, moved)))
         return states, best
 
-    def reached(
-        self, plant: Plant, initial_states: Sequence[Array], before: Sequence[Projection], residuals: Sequence[Array]
+    def better(
+        self, plant: Plant, before: Sequence[Projection], one: Sequence[Array], other: Sequence[Array]
     ) -> tuple[list[Array], list[Projection]]:
-        """Initial states moved to where these residuals (S, m) ask for, and what is left there, in known directions.
-
-        :raises hydraulic_sim.errors.SimulationError: as `try_out`.
-        """
-        states = self.corrected(initial_states, before, residuals)
-        return states, [p.with_raw(r) for p, r in zip(before, self.try_out(plant, states), strict=True)]
+        """Of two initial states of every segment those that leave less, in directions that are known."""
+        tried = [p.with_raw(r) for p, r in zip(before, self.try_out(plant, one), strict=True)]
+        return better_of((one, tried), (other, self._seen_from(before, plant, other)))
 
     def _seen_from(self, before: Sequence[Projection], plant: Plant, states: Sequence[Array]) -> list[Projection]:
         return [p.with_raw(r) for p, r in zip(before, self.residuals(plant, states), strict=True)]
