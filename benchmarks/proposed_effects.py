@@ -6,7 +6,8 @@ Each bench of the independent plant (hidden_effects/) hides one of the catalogue
 has the records and a model file without it. `diagnose` is asked to propose an effect, which joins the model and is
 fitted (`add`, then `calibrate`). Errors are those on records of the same bench that nothing has seen: of the model as
 it was, with the proposed effect, and of the true structure, each refitted by `calibrate`. The last is the same bench,
-measured under the same noise, with nothing hidden. With --given the verdict "outside the library" is taken for granted: the library is not searched.
+measured under the same noise, with nothing hidden. With --given the verdict "outside the library" is taken for granted:
+the library is not searched.
 """
 
 from __future__ import annotations
