@@ -56,7 +56,7 @@ def line(name: str, row: dict[str, Any]) -> str:
         return f"{name:42s} {row['said']}"
     return (
         f"{name:42s} {row['said']:50s} before {row['before']:6.3f}  added {row['added']:6.3f}  "
-        f"refitted {row['joined']:6.3f}  true {row['true']:6.3f}  ratio {row['ratio']:5.2f}  {row['seconds']:5.0f} s"
+        f"refitted {row['refitted']:6.3f}  true {row['true']:6.3f}  ratio {row['ratio']:5.2f}  {row['seconds']:5.0f} s"
     )
 
 
@@ -105,17 +105,17 @@ def examined(bench: benches.Bench, names: tuple[str, ...], given: bool) -> dict[
         hidden = bench.effects
         true = calibrate(load_model(text), made("plain", hidden), made("plain fresh", hidden, " fresh"))
         added = evaluate(joined, fresh).rms
-        refitted = calibrate(joined, records, fresh)
-        reached, best = refitted.result["test"]["after"], true.result["test"]["after"]
+        refitted = calibrate(joined, records, fresh).result["test"]["after"]
+        best = true.result["test"]["after"]
     said = f"{effect.place.removeprefix('unknown_')} over {effect.variable}: {effect.law} {effect.share:.2f}"
     seconds = time.process_time() - begin
     return {
         "said": said,
         "before": before,
         "added": added,
-        "joined": reached,
+        "refitted": refitted,
         "true": best,
-        "ratio": reached / best,
+        "ratio": refitted / best,
         "seconds": seconds,
     }
 

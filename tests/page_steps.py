@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 PATIENCE_MS = 300_000  # a diagnosis on a slow machine that runs other tests beside: 180 s have been seen
-thorough = pytest.mark.thorough  # minutes beside a bench by the wall clock
 
 
 def until(page: Any, condition: str, argument: Any = None) -> Any:

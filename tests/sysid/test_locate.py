@@ -79,11 +79,11 @@ FAULTS = {
 }
 
 
-ALIKE = ("stribeck_friction", "command_delay", "sensor_lag")  # of each subsystem another one is found quicker
+THOROUGH = ("stribeck_friction", "command_delay", "sensor_lag")  # another one of their subsystems is always looked for
 
 
 @pytest.mark.parametrize(
-    "effect", [pytest.param(e, marks=pytest.mark.thorough) if e in ALIKE else e for e in FAULTS]
+    "effect", [pytest.param(e, marks=pytest.mark.thorough) if e in THOROUGH else e for e in FAULTS]
 )
 def test_subsystem_of_a_missing_effect_is_found(model: Model, effect: str) -> None:
     subsystem, values = FAULTS[effect]

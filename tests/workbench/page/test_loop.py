@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_steps import figure, hidden_part, thorough, until
+from page_steps import figure, hidden_part, until
 
 EAGER = Path(__file__).with_name("eager_workbench.py")
 MOST_CLICKS = 12
@@ -73,7 +73,7 @@ def test_a_hidden_effect_is_named_and_added_within_twelve_clicks(page: Any, pict
     assert counted["keys"] == 0
 
 
-@thorough
+@pytest.mark.thorough
 def test_the_new_model_runs_beside_the_plant(page: Any, picture: Callable[..., None]) -> None:
     page.evaluate("location.hash = '#/live'")
     page.click("#start-controller")
@@ -122,7 +122,7 @@ def test_an_error_map_shows_the_samples_behind_a_place(page: Any, picture: Calla
     picture(page, "compare")
 
 
-@thorough
+@pytest.mark.thorough
 def test_locate_names_a_subsystem(page: Any, picture: Callable[..., None]) -> None:
     page.click("#verb-locate")
     page.wait_for_selector("[aria-label=Location]")
@@ -130,7 +130,7 @@ def test_locate_names_a_subsystem(page: Any, picture: Callable[..., None]) -> No
     picture(page, "locate")
 
 
-@thorough
+@pytest.mark.thorough
 def test_figures_of_the_report_open_on_demand(page: Any, picture: Callable[..., None]) -> None:
     loaded = "performance.getEntriesByType('resource').some(({name}) => name.includes('plotly.min'))"
     assert not page.evaluate(loaded)
@@ -141,7 +141,7 @@ def test_figures_of_the_report_open_on_demand(page: Any, picture: Callable[..., 
     picture(page, "report-figure")
 
 
-@thorough
+@pytest.mark.thorough
 def test_what_is_left_before_and_after_is_the_figure_of_the_report(page: Any, picture: Callable[..., None]) -> None:
     page.click("[aria-label=Results] button:has-text('diagnose')")
     page.click("[aria-label='Before and after'] button:has-text('Errors')")
@@ -149,7 +149,7 @@ def test_what_is_left_before_and_after_is_the_figure_of_the_report(page: Any, pi
     picture(page, "before-after-errors")
 
 
-@thorough
+@pytest.mark.thorough
 def test_the_model_of_the_verdict_is_taken(page: Any) -> None:
     page.click("#apply")
     page.wait_for_selector("ol.timeline li.current:has-text('applied')")
@@ -157,7 +157,7 @@ def test_the_model_of_the_verdict_is_taken(page: Any) -> None:
     assert "valve_deadband" in page.evaluate("workbench.state.bench.current_model.effects")
 
 
-@thorough
+@pytest.mark.thorough
 def test_the_free_parameters_are_fitted_after_a_check(page: Any, picture: Callable[..., None]) -> None:
     page.click("#verb-check")
     page.wait_for_selector("[aria-label=Check] .verdict")
@@ -168,7 +168,7 @@ def test_the_free_parameters_are_fitted_after_a_check(page: Any, picture: Callab
     picture(page, "calibrated")
 
 
-@thorough
+@pytest.mark.thorough
 def test_a_clear_verdict_offers_no_experiment_to_tell_models_apart(page: Any) -> None:
     page.click("[aria-label=Results] button:has-text('diagnose')")
     assert page.locator("#next-experiment").is_disabled()

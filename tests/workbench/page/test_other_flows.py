@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_steps import drop, start_simulator, thorough, until
+from page_steps import drop, start_simulator, until
 
 from hydraulic_sim.model_file import load_model, save_model
 from hydraulic_workbench.library import OWN_PLANS
 
-pytestmark = thorough
+pytestmark = pytest.mark.thorough
 
 SAMPLE = Path(__file__).parents[3] / "examples" / "sample_bench"
 TIED = ("spool_dynamics", "command_delay")

@@ -247,11 +247,13 @@ class Fitting:
         before = self.left_on_few(state)
         values = sum(int(s.counted.sum()) for s in self.split.some(LOOK))
         needed = SIGNIFICANT * max(1.0, before / values) + SAME_LOOK * max(before - values, 0.0)
+        if before <= needed:
+            return False
         return before - self.looked_at(model, FINE_LOOK * needed / before) > needed
 
-    def looked_at(self, model: Model, least_gain: float = LAST_GAIN) -> float:
-        """What a fit to a few segments, while a step gains that share, leaves of them."""
-        settings = replace(self._last, least_gain=max(least_gain, LAST_GAIN))
+    def looked_at(self, model: Model, least_gain: float = 0.0) -> float:
+        """What a fit to a few segments leaves of them; it goes on while a step gains that share, or the usual one."""
+        settings = replace(self._last, least_gain=max(least_gain, self._last.least_gain))
         return self.fitted_to(self.split.some(LOOK), model, settings).cost
 
     def left_on_few(self, state: SearchState) -> float:

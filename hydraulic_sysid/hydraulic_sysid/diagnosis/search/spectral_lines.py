@@ -36,8 +36,8 @@ def record_features(at: Linearisation) -> RecordFeatures:
     hydraulic = at.model.kind == "hydraulic"
     stroke = at.model.value("stroke") if hydraulic else math.inf
     if hydraulic and shared > 0.0:
-        codes = stroke / shared, at.model.value("supply_pressure")
-        if any(_converted(s, *codes) for s in at.split.segments):
+        codes, supply = stroke / shared, at.model.value("supply_pressure")
+        if any(_converted(s, codes, supply) for s in at.split.segments):
             shared = 0.0
     return RecordFeatures(spectral_lines(at.split.segments, at.residual), shared, stroke)
 
@@ -47,11 +47,11 @@ def _converted(segments: Segments, codes: float, supply: float) -> bool:
 
     But not those of a position with far fewer ``codes`` over its stroke than they have over the ``supply`` pressure.
     """
-    others = [c for c in segments.channels if c != "position"]
-    noise = dict(zip(segments.channels, segments.noise_std.tolist(), strict=True))
-    steps = [code_step(segments.record[c]) for c in others]
-    seen = zip(others, steps, strict=True)
-    return any(step > _VISIBLE * noise[c] and codes > _COARSER * supply / step for c, step in seen)
+    return any(
+        (step := code_step(segments.record[channel])) > _VISIBLE * noise and codes > _COARSER * supply / step
+        for channel, noise in zip(segments.channels, segments.noise_std.tolist(), strict=True)
+        if channel != "position"
+    )
 
 
 def spectral_lines(segments: Sequence[Segments], residuals: Sequence[Array]) -> tuple[float, ...]:

@@ -1,9 +1,8 @@
 """test [--thorough | PYTEST ARG …]: build, ruff, mypy and the tests; with arguments only pytest on those.
 
-Tests that take long and find what another one or a benchmark finds too (marker `thorough`) are left out, but for
---thorough. The tests fill all processors; those of the wall clock (marker `timing`) run after all others, one after the
-other, and only they are repeated, once, where they fail. The last line printed is the sum of pytest's closing lines.
-Exit code 0 only if everything passed.
+Without --thorough, tests that take long (marker `thorough`) are left out. The tests fill all processors; those of the
+wall clock (marker `timing`) run after all others, one after the other, and only they are repeated, once, where they
+fail. The last line printed is the sum of pytest's closing lines. Exit code 0 only if everything passed.
 """
 
 from __future__ import annotations
@@ -64,10 +63,10 @@ def run(bench: Bench, arguments: list[str]) -> int:
         # Only these, as it takes long to collect all.
         files = sorted(root.glob("tests/**/*.py"))
         timed = [str(file.relative_to(root)) for file in files if "mark.timing" in file.read_text("utf-8")] or ["tests"]
-        usual = "not timing" if thorough else "not timing and not thorough"
+        chosen = "not timing" if thorough else "not timing and not thorough"
         longest = LONGEST_THOROUGH_S if thorough else None
         runs = [
-            Pytest([*pytest, usual, *spread, "tests"], root, variables, longest),
+            Pytest([*pytest, chosen, *spread, "tests"], root, variables, longest),
             Pytest([*pytest, "timing", *timed], root, variables),
         ]
         if runs[-1].code == FAILED_TESTS:
