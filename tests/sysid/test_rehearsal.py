@@ -13,8 +13,9 @@ import pytest
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.rehearsal import rehearse
-from hydraulic_sysid.diagnosis.search.candidate_table import NOTHING, probabilities
+from hydraulic_sysid.diagnosis.search.candidate_table import NOTHING, UNKNOWN, probabilities
 from hydraulic_sysid.diagnosis.search.misfit import Misfit
+from hydraulic_sysid.diagnosis.search.posterior import probability_of_unknown
 from hydraulic_sysid.excitation import Plan, load_plan
 from hydraulic_sysid.verbs import rehearse as verb
 
@@ -74,6 +75,11 @@ def test_probabilities_weigh_what_is_left_against_parameters() -> None:
     found = probabilities(base, [("good", 1, misfit(20_000.0)), ("as_good", 1, misfit(20_000.5)), ("poor", 2, base)])
     assert sum(found.values()) == pytest.approx(1.0)
     assert found["good"] / found["as_good"] == pytest.approx(20.0 ** (0.5 / 30.0), rel=1e-6)
-    assert found["good"] + found["as_good"] > 0.999 and found["poor"] == found[NOTHING] == pytest.approx(1 / 16e3, 0.1)
+    assert found["good"] + found["as_good"] == pytest.approx(1.0 - found[UNKNOWN], abs=1e-3)
+    assert found["poor"] == found[NOTHING] == pytest.approx(found["good"] / 8e3, 0.1)
+    assert found[UNKNOWN] == pytest.approx(probability_of_unknown(base, misfit(20_000.0)), rel=1e-9)
+    lacking = probabilities(base, [("half", 1, misfit(20_250.0))])
+    assert lacking[UNKNOWN] > found[UNKNOWN], "more is left"
     alone = probabilities(misfit(20_000.0), [("nothing_gained", 1, misfit(20_000.0))])
-    assert alone[NOTHING] == pytest.approx(1.0 / (1.0 + 20.0 ** (-np.log(20_000) / 30.0)), rel=1e-6)
+    known = 1.0 - alone[UNKNOWN]
+    assert alone[NOTHING] == pytest.approx(known / (1.0 + 20.0 ** (-np.log(20_000) / 30.0)), rel=1e-6)

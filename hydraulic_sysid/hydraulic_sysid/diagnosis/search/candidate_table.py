@@ -8,26 +8,30 @@ from typing import Any
 from .candidates import subsystem
 from .competing_models import odds
 from .misfit import Misfit
+from .posterior import probability_of_unknown
 from .score_test import CandidateScore
 from .search_state import CandidateRefit, SearchState
 
 NOTHING = ""
 """The hypothesis that no candidate is missing."""
+UNKNOWN = "?"
+"""The hypothesis that a law is missing that the library lacks."""
 
 
 def probabilities(base: Misfit, refits: Sequence[tuple[str, int, Misfit]]) -> dict[str, float]:
-    """Probability of each candidate (name, number of parameters, misfit) and of `NOTHING`, before the search has ended.
+    """Probability of each candidate (name, number of parameters, misfit), `NOTHING` and `UNKNOWN`, in mid-search.
 
-    Given that one of these is right, equally probable beforehand, by the odds with which a verdict tells models apart
-    (`competing_models.odds`); each parameter costs what BIC gives it (Schwarz, Ann. Stat. 6 (1978) 461).
+    By the odds of which those of a verdict are made too: between models (`competing_models.odds`; each parameter costs
+    what BIC gives it, Schwarz, Ann. Stat. 6 (1978) 461) and against an unknown law (`probability_of_unknown`).
     """
     every = [(NOTHING, 0, base), *refits]
     best = min((misfit for _, _, misfit in every), key=lambda m: m.total)
     left = {name: misfit.total + count * best.freedom for name, count, misfit in every}
     least = min(left.values())
     weight = {name: 1.0 / odds(best, value - least) for name, value in left.items()}
-    total = sum(weight.values())
-    return {name: value / total for name, value in weight.items()}
+    unknown = probability_of_unknown(base, best)
+    share = (1.0 - unknown) / sum(weight.values())
+    return {UNKNOWN: unknown, **{name: share * value for name, value in weight.items()}}
 
 
 def candidate_table(
