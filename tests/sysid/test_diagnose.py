@@ -19,6 +19,7 @@ from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits, varie
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, HeldNumbers, as_filed, relaxed
+from hydraulic_sysid.diagnosis.search.drive_faults import BETWEEN_SAMPLES
 from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material, reduction
@@ -260,6 +261,24 @@ def test_an_effect_that_explains_nearly_all_may_leave_another(model, after: floa
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     assert verdict.kind_of(found, tied=False) == verdict.MISSING
     assert verdict.kind_of(found, tied=False, curves=[SimpleNamespace(share=share)]) == kind
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kind"),
+    [
+        (23.0, 2.3, verdict.RECORDING),
+        (1.25, 1.18, verdict.OUTSIDE),  # disturbances of a drive take up a part of anything
+        (30.0, 9.0, verdict.OUTSIDE),  # and what is far off is not theirs
+    ],
+)
+def test_an_unknown_drive_is_blamed_for_what_it_explains(model, before: float, after: float, kind: str) -> None:
+    base = state(model, 3000 * after, {})
+    fault = RecordingFault(BETWEEN_SAMPLES, 1e-3, 0.0, 1000.0)
+    found = SearchResult(
+        model, Split([], []), FitSettings(), base, base, {}, {}, faults=[fault],
+        as_recorded=state(model, 3000 * before, {}),
+    )  # fmt: skip
+    assert verdict.kind_of(found, tied=False) == kind
 
 
 @pytest.mark.parametrize(

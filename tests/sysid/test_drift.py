@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import document, verdict
-from hydraulic_sysid.diagnosis.search.drift import LEAST, Drift
+from hydraulic_sysid.diagnosis.search.drift import LEAST, Drift, steady
 from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import SearchResult
 from hydraulic_sysid.estimation.fit import FitSettings
@@ -43,8 +45,8 @@ def record(model: Model, change: float, seed: int) -> Record:
     return Record.sampled(f"r{seed}", DT, {"drive": drive, **seen})
 
 
-def followed(model: Model, change: float) -> SearchResult:
-    search = Search.of(model, [record(model, change, seed) for seed in (1, 2)], (), FitSettings(), lambda text: None)
+def followed(model: Model, change: float, seeds: Sequence[int] = (1, 2)) -> SearchResult:
+    search = Search.of(model, [record(model, change, seed) for seed in seeds], (), FitSettings(), lambda text: None)
     state = search.judged(search.state(model))
     return search.with_drift(SearchResult(model, search.split, FitSettings(), state, state, {}, {}))
 
@@ -68,6 +70,28 @@ def test_a_parameter_that_changes_along_the_records_is_named(model: Model, chang
 def test_one_that_stays_or_that_a_law_may_be_off_anyway_is_not(model: Model, change: float) -> None:
     result = followed(model, change)
     assert result.drift is None and verdict.judge(result).kind == verdict.COMPLETE
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.05, True), (0.02, False)])
+def test_on_a_small_change_three_records_must_agree(model: Model, share: float, named: bool) -> None:
+    found = followed(model, share * 0.02, (1, 2, 3)).drift
+    assert (found is not None) is named
+    if found is not None:
+        assert found.key == KEY and found.share == pytest.approx(share, rel=0.2)
+
+
+def test_neither_one_segment_nor_one_record_turns_it() -> None:
+    draw = np.random.default_rng(5)
+    records, fitted = np.repeat(np.arange(4), 20), np.arange(80) % 3 > 0
+    size = draw.uniform(0.5, 1.5, 80)
+    own = size * draw.normal(1.0, 0.5, 80)
+    assert steady(own, size, fitted, records)
+    own[7] = -30.0
+    assert steady(own, size, fitted, records), "one segment that lacks something else"
+    own = np.where(records == 2, -own, own)
+    assert not steady(own, size, fitted, records), "a record says the opposite"
+    few = records < 2
+    assert not steady(own[few], size[few], fitted[few], records[few])
 
 
 def test_a_phase_that_drifts_is_another_frequency(model: Model) -> None:

@@ -12,12 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hydraulic_sim.arrays import Array, Index, Mask
 from hydraulic_sysid.estimation.refinement import LAW
 
-from .agreement import sure
+from .agreement import agreement, sure
 from .linearisation import Linearisation
+from .misfit import FEW
 
 LEAST = LAW * 12.0**0.5  # of a parameter over a record: then its root mean square is what a law may be off anyway
+RECORDS = 3  # that agree on a smaller change, of no less than a law may be off, …
+AGREE = 20.0  # … with a squared size over its variance of more than this
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,8 @@ class Drift:
 def drift(at: Linearisation, least: float) -> Drift | None:
     """The parameter whose change along the records explains most of what a model leaves, if that is more than chance.
 
-    And more than laws may be off anyway, and if segments agree on it. ``least``: reduction of the sum of squares.
+    And more than laws may be off anyway, and if segments agree on it; a smaller one, or one that laws that may be off
+    in every segment take up, where records agree, too. ``least``: reduction of the sum of squares.
     """
     parameters, columns = at.parameters, at.columns
     angles = np.isfinite(parameters.period)  # one that goes round is a frequency that is another
@@ -62,8 +67,23 @@ def drift(at: Linearisation, least: float) -> Drift | None:
     j, by, size = laws[best], float(slope[best]), float(total[best])
     key, value, scale = parameters.keys[j], float(parameters.values[j]), float(parameters.scales[j])
     share = by * scale / max(abs(value - (at.model.parameter(key).null or 0.0)), LEAST * scale)
-    if by**2 * size < least or abs(share) < LEAST:
-        return None
-    if not sure(-by * along[:, best], by**2 * squares[:, best], fitted):
+    gains, sizes = -by * along[:, best], by**2 * squares[:, best]
+    large = by**2 * size >= least and abs(share) >= LEAST and sure(gains, sizes, fitted)
+    records = np.repeat(np.arange(len(late)), [len(x) for x in late])
+    if not large and (abs(share) < LAW or not steady(gains, sizes, fitted, records)):
         return None
     return Drift(key, value, by * scale, scale / size**0.5, share)
+
+
+def steady(own: Array, size: Array, fitted: Mask, records: Index) -> bool:
+    """Whether segments agree on a change, but for the few that differ most, and so do records.
+
+    ``own``, ``size``, ``fitted`` (S,) as `agreement` takes them, and which of the ``records`` (S,) each is of. What a
+    law lacks may follow the time in a sweep; it does not in records of several kinds.
+    """
+    off = np.abs(own - size * own.sum() / max(float(size.sum()), np.finfo(float).tiny))
+    kept = off < np.sort(off)[-max(round(FEW * off.size), 1)]
+    in_records = [np.bincount(records[kept], weights=x[kept]).astype(float) for x in (own, size)]
+    if np.count_nonzero(in_records[1]) < RECORDS or agreement(in_records[0], in_records[1]) < AGREE:
+        return False
+    return sure(own[kept], size[kept], fitted[kept])

@@ -79,6 +79,13 @@ class Misfit:
         """The sums alone, whatever single segments leave."""
         return replace(self, by_segment=np.zeros(0))
 
+    def times(self, factor: float) -> Misfit:
+        """The same over a noise whose mean square is another by this factor."""
+        fit, validation = factor * self.fit, factor * self.validation
+        return replace(
+            self, fit=fit, validation=validation, typical=factor * self.typical, by_segment=factor * self.by_segment
+        )
+
     @property
     def excess(self) -> float:
         """What of the sum of squares noise does not explain."""

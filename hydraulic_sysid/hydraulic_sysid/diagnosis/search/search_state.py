@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -114,14 +114,14 @@ class SearchResult:
         if self.as_recorded is None:
             return self.before
         ratio = noise_ratio(self.as_recorded.linearisation.split, self.split)
-        return replace(self.before, fit=ratio * self.before.fit, validation=ratio * self.before.validation)
+        return self.before.times(ratio)
 
     @property
     def unexplained_share(self) -> float:
         """What is left in the end, of what was there before anything was explained (0…1); of the force, if by that."""
         if self.by_force is not None:
             return 1.0 - self.by_force.share
-        return unexplained_share(self.before, self.final.misfit)
+        return unexplained_share(self.before_over_noise, self.final.misfit)
 
     @property
     def added(self) -> list[str]:

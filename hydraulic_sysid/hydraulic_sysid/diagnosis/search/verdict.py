@@ -40,7 +40,8 @@ DECIDED = (MISSING, COMPLETE, DATA_SHEET, RECORDING)
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
 VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave, …
-MUCH = 4.0  # … and from which on it is not what is wrong
+MUCH = 4.0  # … and from which on it is not what is wrong, …
+BLAMED = 0.5  # … nor where more than this share of what was to be explained is left
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
 BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to 15 %
 UNATTRIBUTED = 0.1  # of what is left: a curve that explains less of it shows no law that is missing
@@ -175,8 +176,13 @@ def drive_unknown(result: SearchResult) -> bool:
 
 
 def drive_blamed(result: SearchResult) -> bool:
-    """Whether that is all there is to say: beside what is far off, a drive that is not known so well is a detail."""
-    return drive_unknown(result) and result.base.misfit.usual < MUCH
+    """Whether that is all there is to say: it explains the most, and what is left is not far off the noise.
+
+    Disturbances of a drive are free enough to take up a part of anything.
+    """
+    left = result.base.misfit
+    most = unexplained_share(result.before_over_noise, left) < BLAMED
+    return drive_unknown(result) and most and left.usual < MUCH
 
 
 def strained(result: SearchResult) -> bool:
