@@ -26,6 +26,7 @@ import sys
 from pathlib import Path
 
 from hidden_effects import benches, family, matrix
+from hidden_effects.reliability_diagram import reliability_diagram
 from hydraulic_sysid import campaign
 from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_VALUES
 
@@ -51,6 +52,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true", help="as `diagnose --quick` answers")
     parser.add_argument("--report-only", action="store_true", help="examine nothing, report what is in the folder")
     parser.add_argument("--doc", action="store_true", help=f"write {PAGE.relative_to(ROOT)}")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the reliability diagram")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the benches instead of diagnosing them")
     options = parser.parse_args(argv)
     if options.quick and options.doc:
@@ -78,6 +80,8 @@ def main(argv: list[str] | None = None) -> int:
     by_setting = matrix.setting_rows(found) if options.family else []
     reliability = matrix.reliability_rows(found)
     print("\n".join([*matrix.rate_rows(found), "", *reliability, "", *by_setting, "", *matrix.confusion_rows(found)]))
+    if options.picture:
+        print(reliability_diagram([d["marks"] for d in found], options.picture))
     if options.doc:
         PAGE.write_text(matrix.document(matrix.kept(options.out)))
         print(PAGE)

@@ -6,8 +6,10 @@ import json
 from typing import Any
 
 import pytest
+from matplotlib.axes import Axes
 
 from hidden_effects import benches, matrix, plant, scoring
+from hidden_effects.reliability_diagram import reliability_diagram
 from hydraulic_sysid.campaign.outcome import CASES
 from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_VALUES
 
@@ -96,6 +98,27 @@ def test_verdicts_are_counted_by_the_probability_that_they_state():
     assert scoring.rates(ties)["true_among"] == (1, 2)
     rows = matrix.reliability_rows([{"marks": m} for m in marks])
     assert rows[2:] == ["| 50…80 % | 60 % | 1 | 1 = 100 % | 21…100 % |", "| 95…99 % | 97 % | 3 | 2 = 67 % | 21…94 % |"]
+
+
+def test_the_reliability_diagram_shows_every_bin(tmp_path, monkeypatch):
+    said = ((0.97, True), (0.96, False), (0.6, True), (None, False))
+    marks = [{"probability": p, "verdict_right": right} for p, right in said]
+    drawn = []
+    plot = Axes.errorbar
+
+    def errorbar(self, x, y, yerr, **style):
+        drawn.append((x, y, yerr))
+        return plot(self, x, y, yerr, **style)
+
+    monkeypatch.setattr(Axes, "errorbar", errorbar)
+    assert reliability_diagram(marks, tmp_path / "r.png").stat().st_size > 5000
+    low, high = scoring.wilson(1, 2)
+    assert drawn == [
+        (60.0, 100.0, [[pytest.approx(100 - 100 * scoring.wilson(1, 1)[0])], [pytest.approx(0.0, abs=1e-9)]]),
+        (pytest.approx(96.5), 50.0, [[pytest.approx(50 - 100 * low)], [pytest.approx(100 * high - 50)]]),
+    ]
+    with pytest.raises(ValueError, match="nothing to draw"):
+        reliability_diagram([{"probability": None, "verdict_right": True}], tmp_path / "none.png")
 
 
 def test_wilson_interval():
