@@ -36,7 +36,7 @@ def reliability_diagram(marks: list[dict[str, Any]], path: Path) -> Path:
             str(count), (100 * mean, 100 * share), xytext=(-6 if left else 6, -3), textcoords="offset points",
             ha="right" if left else "left", fontsize=8,
         )  # fmt: skip
-    ax.set(xlim=(0, 102), ylim=(0, 102), xlabel="said: probability of a verdict, %", ylabel="right, %")
+    ax.set(xlim=(0, 102), ylim=(-2, 102), xlabel="said: probability of a verdict, %", ylabel="right, %")
     ax.set_title(f"{sum(b[3] for b in bins)} verdicts; the number at each point", fontsize=10)
     ax.legend(loc="upper left", fontsize=9)
     ax.grid(alpha=0.3)

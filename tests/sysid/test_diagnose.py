@@ -249,6 +249,17 @@ def test_what_no_curve_explains_is_no_other_effect(model, share: float | None, k
 
 
 @pytest.mark.parametrize(
+    ("share", "said"), [(0.34, "like a leak over time, which would explain 34 %"), (0.04, "No curve at any place")]
+)
+def test_a_curve_that_explains_nothing_is_not_what_it_looks_like(model, share: float, said: str) -> None:
+    base = state(model, 30000.0, {})
+    base.__dict__["remainders"] = []
+    found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
+    curve = SimpleNamespace(summary="a leak", variable="time", share=share)
+    assert said in verdict.sentences(found, verdict.Verdict(verdict.OUTSIDE, [], {}, {}), [curve])
+
+
+@pytest.mark.parametrize(
     ("after", "share", "kind"),
     [
         (20.0, 0.6, verdict.OUTSIDE),  # far more than noise, most of which a law at some place explains

@@ -257,7 +257,9 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     if curves and result.drift is None:
         best = curves[0]
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
-        text += f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
+        looks = f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
+        nothing = f"No curve at any place of the plant would explain {100 * UNATTRIBUTED:.0f} % of it."
+        text += looks if best.share > UNATTRIBUTED else nothing
     # Not what the numbers of the data sheet were bent to: they imitate what no effect explains.
     return " ".join([text.strip(), *recording_sentences(result), *aside])
 
