@@ -15,7 +15,7 @@ from .competing_models import ODDS
 from .misfit import Misfit
 from .remainder import immaterial
 from .search_state import SearchResult
-from .verdict import COMPLETE, DATA_SHEET, INDISTINGUISHABLE, OUTSIDE, RECORDING, UNDECIDED, Verdict
+from .verdict import COMPLETE, DATA_SHEET, INDISTINGUISHABLE, OUTSIDE, RECORDING, UNDECIDED, Verdict, turned_by_drift
 
 HIGH = 0.99  # nothing is said to be surer than this
 
@@ -70,7 +70,7 @@ def explanations(result: SearchResult, verdict: Verdict, calibration: Calibratio
     if verdict.kind == UNDECIDED or result.by_force is not None or moot:
         return []
     unknown = probability_of_unknown(result.before_over_noise, final, calibration)
-    if result.drift is not None and verdict.kind == OUTSIDE:
+    if verdict.kind == OUTSIDE and turned_by_drift(result):
         unknown = max(unknown, calibration.odds / (1.0 + calibration.odds))
     known = _known(result, verdict)
     share = (1.0 - unknown) / sum(weight for weight, _ in known.values())

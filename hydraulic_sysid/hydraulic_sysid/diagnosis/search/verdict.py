@@ -18,7 +18,7 @@ from hydraulic_sysid.estimation.parameters import Parameters
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
 from .data_sheet import Deviation
-from .drift import Drift
+from .drift import LEAST, Drift
 from .drive_faults import DriveHypothesis
 from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
@@ -142,7 +142,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     """
     if result.stopped:
         return UNDECIDED
-    if result.drift is not None and not drive_unknown(result):
+    if turned_by_drift(result):
         return OUTSIDE
     final = result.final.misfit
     little = final.little or immaterial(final, result.remainders) or result.by_force is not None
@@ -168,6 +168,15 @@ def faulty(result: SearchResult) -> bool:
     """Whether the recording, not the physics, is at fault."""
     saturated = any(a.reason == SATURATED for a in result.split.set_aside)
     return saturated or bool(result.faults) or any(s.share > SPIKY for s in result.spikes)
+
+
+def turned_by_drift(result: SearchResult) -> bool:
+    """Whether a parameter that changes along the records is what no effect explains.
+
+    Beside effects that are missing a change that a law may be off anyway is a detail.
+    """
+    found = result.drift
+    return found is not None and not drive_unknown(result) and (not result.added or abs(found.share) >= LEAST)
 
 
 def drive_unknown(result: SearchResult) -> bool:
@@ -201,7 +210,7 @@ def strained(result: SearchResult) -> bool:
 
 def place(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str | None:
     """The subsystem of the first effect added, or of the curve that explains most of what no effect does."""
-    if verdict.kind == OUTSIDE and result.drift is not None and "." in result.drift.key:
+    if verdict.kind == OUTSIDE and turned_by_drift(result) and result.drift is not None and "." in result.drift.key:
         return subsystem(result.model.library[result.drift.key.partition(".")[0]])
     if verdict.kind == OUTSIDE:
         return curves[0].subsystem if curves else None
@@ -234,6 +243,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         return " ".join(["Recording:", *found, fell, left, UNCERTAIN if drive_unknown(result) else NO_EFFECT])
     if verdict.kind == DATA_SHEET:
         return " ".join(["Data sheet:", *data_sheet_sentences(result), *aside, fell, left, NO_EFFECT])
+    aside = [*drift_sentences(result, verdict), *aside]
     beside = [*force_sentences(result), *data_sheet_sentences(result), *recording_sentences(result), *aside]
     if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > UNEXPLAINED:
         beside.append(remainder_sentence(result.remainders))
@@ -249,12 +259,13 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         faults = "".join(f", or nothing is, and {f.text}" for f in result.faults_instead)
         return " ".join([f"Missing: {_and(parts)}{faults}. These data cannot distinguish them. {fell}{why}", *beside])
     none = "no effect of it explains what is left"
-    text = f"Outside the library: {none if result.drift is None else _changes(result, result.drift)}. "
+    drift = result.drift if turned_by_drift(result) else None
+    text = f"Outside the library: {none if drift is None else f'{_changes(result, drift)}, as no effect does'}. "
     if result.added:
         text += f"The nearest is {_and(result.added)}. {fell} "
     else:
         text += f"On validation data the residual is {final:.3g} × noise. "
-    if curves and result.drift is None:
+    if curves and drift is None:
         best = curves[0]
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
         looks = f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
@@ -282,11 +293,18 @@ def _why_alike(model: Model) -> str:
     return " Before the motion or behind it, they act alike on the position."
 
 
+def drift_sentences(result: SearchResult, verdict: Verdict) -> list[str]:
+    """A change along the records that does not make the verdict."""
+    if result.drift is None or drive_unknown(result) or (verdict.kind == OUTSIDE and turned_by_drift(result)):
+        return []
+    return [f"Besides, {_changes(result, result.drift)}."]
+
+
 def _changes(result: SearchResult, d: Drift) -> str:
     unit, sign = result.model.parameter(d.key).unit, "+" if d.change > 0.0 else ""
     by = f"{sign}{quantity(d.change, unit, 2, error=d.standard_error)}"
     mean = quantity(d.value, unit, 3)
-    return f"{d.key} changes along the records, by {by} from beginning to end ({mean} in the mean), as no effect does"
+    return f"{d.key} changes along the records, by {by} from beginning to end ({mean} in the mean)"
 
 
 def remainder_sentence(found: Sequence[Remainder]) -> str:
