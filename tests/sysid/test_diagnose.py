@@ -309,6 +309,15 @@ def test_a_law_that_fits_only_bent_to_its_limits_is_not_named(model, damping: fl
     assert verdict.kind_of(found, tied=tied) == kind
 
 
+@pytest.mark.parametrize("exponent", [1.2, 1.4])
+def test_a_shape_that_is_usually_at_its_limit_is_not_bent(model, exponent: float) -> None:
+    """Air that is compressed in no time is adiabatic."""
+    found = model.with_effect("entrained_air", {"fraction": 0.04, "exponent": exponent})
+    base, final = state(model, 8000.0, {}), state(found, 3000.0, {})
+    result = SearchResult(model, Split([], []), FitSettings(), base, final, {"entrained_air": final.misfit}, {})
+    assert verdict.kind_of(result, tied=False) == verdict.MISSING
+
+
 @pytest.mark.parametrize(
     ("own", "other", "near"),
     [

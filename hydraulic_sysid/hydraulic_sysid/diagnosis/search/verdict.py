@@ -197,11 +197,15 @@ def drive_blamed(result: SearchResult) -> bool:
 def strained(result: SearchResult) -> bool:
     """Whether shape parameters of effects added ended at a bound: the law had to be bent to its limits to fit.
 
-    A shape that vanishes is no such limit: without it the law is a simpler one.
+    A shape that vanishes is no such limit: without it the law is a simpler one. Nor is one that usually is there: air
+    that is compressed in no time is adiabatic.
     """
     model = result.final.model
     keys = [
-        f"{name}.{p.name}" for name in result.added for p in model.library[name].parameters if p.null is None and p.free
+        f"{name}.{p.name}"
+        for name in result.added
+        for p in model.library[name].parameters
+        if p.null is None and p.free and p.default not in p.bounds
     ]
     shapes = Parameters.of(model, keys)
     lowest = dict(zip(shapes.keys, shapes.low.tolist(), strict=True))
