@@ -70,8 +70,9 @@ def explanations(result: SearchResult, verdict: Verdict, calibration: Calibratio
     if verdict.kind == UNDECIDED or result.by_force is not None or moot:
         return []
     unknown = probability_of_unknown(result.before_over_noise, final, calibration)
-    if verdict.kind == OUTSIDE and turned_by_drift(result):
-        unknown = max(unknown, calibration.odds / (1.0 + calibration.odds))
+    if verdict.kind == OUTSIDE:
+        # Not by what is left alone: a drift, a law bent to its limits. What is said is no less probable than all else.
+        unknown = max(unknown, calibration.odds / (1.0 + calibration.odds) if turned_by_drift(result) else 0.5)
     known = _known(result, verdict)
     share = (1.0 - unknown) / sum(weight for weight, _ in known.values())
     found = [
