@@ -38,7 +38,7 @@ def reliability_diagram(marks: list[dict[str, Any]], path: Path) -> Path:
         )  # fmt: skip
     ax.set(xlim=(0, 102), ylim=(-2, 102), xlabel="said: probability of a verdict, %", ylabel="right, %")
     ax.set_title(f"{sum(b[3] for b in bins)} verdicts; the number at each point", fontsize=10)
-    ax.legend(loc="upper left", fontsize=9)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
     ax.grid(alpha=0.3)
     figure.savefig(path, dpi=100)
     return path

@@ -19,6 +19,7 @@ from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits, varie
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, HeldNumbers, as_filed, relaxed
+from hydraulic_sysid.diagnosis.search.drift import Drift
 from hydraulic_sysid.diagnosis.search.drive_faults import BETWEEN_SAMPLES
 from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
@@ -253,7 +254,6 @@ def test_what_no_curve_explains_is_no_other_effect(model, share: float | None, k
 )
 def test_a_curve_that_explains_nothing_is_not_what_it_looks_like(model, share: float, said: str) -> None:
     base = state(model, 30000.0, {})
-    base.__dict__["remainders"] = []
     found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
     curve = SimpleNamespace(summary="a leak", variable="time", share=share)
     assert said in verdict.sentences(found, verdict.Verdict(verdict.OUTSIDE, [], {}, {}), [curve])
@@ -290,6 +290,20 @@ def test_an_unknown_drive_is_blamed_for_what_it_explains(model, before: float, a
         as_recorded=state(model, 3000 * before, {}),
     )  # fmt: skip
     assert verdict.kind_of(found, tied=False) == kind
+
+
+@pytest.mark.parametrize(("share", "begins"), [(0.05, "Missing: "), (0.3, "Outside the library: coulomb_friction")])
+def test_beside_an_effect_that_is_missing_a_small_change_is_a_detail(model, share: float, begins: str) -> None:
+    base, final = state(model, 12000.0, {}), state(model.with_effect("constant_load"), 3000.0, {})
+    found = SearchResult(
+        model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {},
+        drift=Drift("coulomb_friction.level", 450.0, 450.0 * share, 2.0, share),
+    )  # fmt: skip
+    judged = verdict.judge(found)
+    said = verdict.sentences(found, judged, [])
+    assert said.startswith(begins)
+    assert said.count("coulomb_friction.level changes along the records") == 1
+    assert verdict.place(found, judged, []) == "force"
 
 
 @pytest.mark.parametrize(

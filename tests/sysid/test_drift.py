@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,10 +13,8 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import document, verdict
 from hydraulic_sysid.diagnosis.search.drift import LEAST, Drift, steady
-from hydraulic_sysid.diagnosis.search.holdout import Split
-from hydraulic_sysid.diagnosis.search.misfit import Misfit
 from hydraulic_sysid.diagnosis.search.search import Search
-from hydraulic_sysid.diagnosis.search.search_state import SearchResult, SearchState
+from hydraulic_sysid.diagnosis.search.search_state import SearchResult
 from hydraulic_sysid.estimation.fit import FitSettings
 
 DT, SECONDS, PIECE = 1e-3, 16.0, 200
@@ -82,24 +78,6 @@ def test_on_a_small_change_three_records_must_agree(model: Model, share: float, 
     assert (found is not None) is named
     if found is not None:
         assert found.key == KEY and found.share == pytest.approx(share, rel=0.2)
-
-
-@pytest.mark.parametrize(("share", "begins"), [(0.05, "Missing: "), (0.3, f"Outside the library: {KEY} changes")])
-def test_beside_an_effect_that_is_missing_a_small_change_is_a_detail(model: Model, share: float, begins: str) -> None:
-    def state(mean_square: float, model: Model) -> SearchState:
-        left = Misfit(2000.0 * mean_square, 1000.0 * mean_square, 2000, 1000, typical=mean_square)
-        found = SearchState(model, cast(Any, SimpleNamespace(split=Split([], []))), left, [])
-        found.__dict__["remainders"] = []
-        return found
-
-    base, final = state(4.0, model), state(1.0, model.with_effect("constant_load"))
-    found = SearchResult(
-        model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {},
-        drift=Drift(KEY, 0.02, 0.02 * share, 1e-4, share),
-    )  # fmt: skip
-    said = verdict.sentences(found, verdict.judge(found), [])
-    assert said.startswith(begins)
-    assert said.count(f"{KEY} changes along the records") == 1
 
 
 def test_neither_one_segment_nor_one_record_turns_it() -> None:

@@ -124,7 +124,8 @@ def diagnose(
         if verdict.kind == verdicts.INDISTINGUISHABLE and tied:
             competing["+".join(tied)] = done
         before, after = found.base.model, found.final.model if found.added or found.moved else None
-        suspected = None if not outside else before if proxy else after
+        asked = outside and verdicts.drifting_effect(found) is None  # which says by itself where it is
+        suspected = None if not asked else before if proxy else after
         del found, suspect  # their sensitivities would take up the memory that the balances need
         say("balances")
         rows, where = _balances(before, records, before is suspected)

@@ -180,7 +180,6 @@ def with_balances(
     keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
     rows = [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]
     clear = any(c["explained_share"] > _CLEAR for c in whole["nonparametric_curves"][:1])
-    clear = clear or (whole["drift"] is not None and "." in whole["drift"]["key"])  # which says whose it is
     where = suspected[0] if suspected and not clear else whole["verdict"]["subsystem"]
     return {**whole, "balances": rows, "verdict": {**whole["verdict"], "subsystem": where}}
 

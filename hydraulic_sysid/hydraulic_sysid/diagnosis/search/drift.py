@@ -17,7 +17,7 @@ from hydraulic_sysid.estimation.refinement import LAW
 
 from .agreement import agreement, sure
 from .linearisation import Linearisation
-from .misfit import FEW
+from .misfit import but_the_worst
 
 LEAST = LAW * 12.0**0.5  # of a parameter over a record: then its root mean square is what a law may be off anyway
 RECORDS = 3  # that agree on a smaller change, of no less than a law may be off, …
@@ -82,7 +82,7 @@ def steady(own: Array, size: Array, fitted: Mask, records: Index) -> bool:
     law lacks may follow the time in a sweep; it does not in records of several kinds.
     """
     off = np.abs(own - size * own.sum() / max(float(size.sum()), np.finfo(float).tiny))
-    kept = off < np.sort(off)[-max(round(FEW * off.size), 1)]
+    kept = but_the_worst(off, np.ones(off.size))
     in_records = [np.bincount(records[kept], weights=x[kept]).astype(float) for x in (own, size)]
     if np.count_nonzero(in_records[1]) < RECORDS or agreement(in_records[0], in_records[1]) < AGREE:
         return False

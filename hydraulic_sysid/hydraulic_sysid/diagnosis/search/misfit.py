@@ -116,7 +116,7 @@ def misfit(split: Split, costs: Sequence[Array], prior: float = 0.0) -> Misfit:
     """Of the sums of squares ``costs[i]`` (S_i,) and of the prior; each initial state takes its degrees of freedom."""
     sums, counts = [0.0, 0.0], [0, 0]
     cost, count = np.concatenate(list(costs)), np.concatenate([s.counted for s in split.segments])
-    kept = _but_the_worst(cost, count)
+    kept = but_the_worst(cost, count)
     for segments, fit, own in zip(split.segments, split.fit, costs, strict=True):
         for i, part in enumerate((fit, ~fit)):
             sums[i] += float(own[part].sum())
@@ -142,7 +142,7 @@ def material(before: Misfit, after: Misfit) -> bool:
     gain, fit, validation = reduction(before, after), before.fit - after.fit, before.validation - after.validation
     if _comparable(before, after):
         gains = before.by_segment - after.by_segment
-        kept = _but_the_worst(after.by_segment, after.counted)
+        kept = but_the_worst(after.by_segment, after.counted)
         fit, validation = (float(gains[kept][part[kept]].sum()) for part in (after.fitted, ~after.fitted))
     held = not before.n_validation or validation > CONFIRMED * before.variance
     return gain >= before.least and held and fit > SIGNIFICANT * before.variance
@@ -161,7 +161,7 @@ def explained(before: Misfit, after: Misfit) -> float:
     """Share of what noise does not explain that has gone, but for the segments that are worst in the end."""
     gain, excess = before.total - after.total, before.excess
     if _comparable(before, after):
-        kept = _but_the_worst(after.by_segment, after.counted)
+        kept = but_the_worst(after.by_segment, after.counted)
         gain = float((before.by_segment - after.by_segment)[kept].sum())
         excess = float((before.by_segment - before.counted)[kept].sum())
     return gain / max(excess, 1e-9 * before.total, gain)
@@ -177,7 +177,8 @@ def _comparable(before: Misfit, after: Misfit) -> bool:
     return 0 < before.by_segment.size == after.by_segment.size
 
 
-def _but_the_worst(cost: Array, count: Array) -> Index:
+def but_the_worst(cost: Array, count: Array) -> Index:
+    """All segments (S,) but the few that cost most per value: no single one turns a verdict."""
     return np.argsort(cost / count)[: cost.size - _few(cost)]
 
 

@@ -15,7 +15,7 @@ from .competing_models import ODDS
 from .misfit import Misfit
 from .remainder import immaterial
 from .search_state import SearchResult
-from .verdict import COMPLETE, DATA_SHEET, INDISTINGUISHABLE, OUTSIDE, RECORDING, UNDECIDED, Verdict, turned_by_drift
+from .verdict import COMPLETE, DATA_SHEET, INDISTINGUISHABLE, OUTSIDE, RECORDING, UNDECIDED, Verdict, decisive_drift
 
 HIGH = 0.99  # nothing is said to be surer than this
 
@@ -72,7 +72,8 @@ def explanations(result: SearchResult, verdict: Verdict, calibration: Calibratio
     unknown = probability_of_unknown(result.before_over_noise, final, calibration)
     if verdict.kind == OUTSIDE:
         # Not by what is left alone: a drift, a law bent to its limits. What is said is no less probable than all else.
-        unknown = max(unknown, calibration.odds / (1.0 + calibration.odds) if turned_by_drift(result) else 0.5)
+        by_drift = decisive_drift(result) is not None
+        unknown = max(unknown, calibration.odds / (1.0 + calibration.odds) if by_drift else 0.5)
     known = _known(result, verdict)
     share = (1.0 - unknown) / sum(weight for weight, _ in known.values())
     found = [

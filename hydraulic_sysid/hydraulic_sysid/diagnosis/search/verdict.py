@@ -142,7 +142,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     """
     if result.stopped:
         return UNDECIDED
-    if turned_by_drift(result):
+    if decisive_drift(result) is not None:
         return OUTSIDE
     final = result.final.misfit
     little = final.little or immaterial(final, result.remainders) or result.by_force is not None
@@ -170,13 +170,21 @@ def faulty(result: SearchResult) -> bool:
     return saturated or bool(result.faults) or any(s.share > SPIKY for s in result.spikes)
 
 
-def turned_by_drift(result: SearchResult) -> bool:
-    """Whether a parameter that changes along the records is what no effect explains.
+def decisive_drift(result: SearchResult) -> Drift | None:
+    """The change along the records, if it is what no effect explains.
 
     Beside effects that are missing a change that a law may be off anyway is a detail.
     """
     found = result.drift
-    return found is not None and not drive_unknown(result) and (not result.added or abs(found.share) >= LEAST)
+    if found is None or drive_unknown(result) or (result.added and abs(found.share) < LEAST):
+        return None
+    return found
+
+
+def drifting_effect(result: SearchResult) -> str | None:
+    """The effect whose parameter changes like that; None also where it is a number of the plant itself."""
+    drift = decisive_drift(result)
+    return drift.key.partition(".")[0] if drift is not None and "." in drift.key else None
 
 
 def drive_unknown(result: SearchResult) -> bool:
@@ -214,8 +222,9 @@ def strained(result: SearchResult) -> bool:
 
 def place(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str | None:
     """The subsystem of the first effect added, or of the curve that explains most of what no effect does."""
-    if verdict.kind == OUTSIDE and turned_by_drift(result) and result.drift is not None and "." in result.drift.key:
-        return subsystem(result.model.library[result.drift.key.partition(".")[0]])
+    drifting = drifting_effect(result)
+    if verdict.kind == OUTSIDE and drifting is not None:
+        return subsystem(result.model.library[drifting])
     if verdict.kind == OUTSIDE:
         return curves[0].subsystem if curves else None
     return subsystem(result.model.library[result.added[0]]) if result.added else None
@@ -247,7 +256,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         return " ".join(["Recording:", *found, fell, left, UNCERTAIN if drive_unknown(result) else NO_EFFECT])
     if verdict.kind == DATA_SHEET:
         return " ".join(["Data sheet:", *data_sheet_sentences(result), *aside, fell, left, NO_EFFECT])
-    aside = [*drift_sentences(result, verdict), *aside]
+    aside = [*drift_sentences(result), *aside]
     beside = [*force_sentences(result), *data_sheet_sentences(result), *recording_sentences(result), *aside]
     if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > UNEXPLAINED:
         beside.append(remainder_sentence(result.remainders))
@@ -263,7 +272,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         faults = "".join(f", or nothing is, and {f.text}" for f in result.faults_instead)
         return " ".join([f"Missing: {_and(parts)}{faults}. These data cannot distinguish them. {fell}{why}", *beside])
     none = "no effect of it explains what is left"
-    drift = result.drift if turned_by_drift(result) else None
+    drift = decisive_drift(result)
     text = f"Outside the library: {none if drift is None else f'{_changes(result, drift)}, as no effect does'}. "
     if result.added:
         text += f"The nearest is {_and(result.added)}. {fell} "
@@ -297,9 +306,9 @@ def _why_alike(model: Model) -> str:
     return " Before the motion or behind it, they act alike on the position."
 
 
-def drift_sentences(result: SearchResult, verdict: Verdict) -> list[str]:
+def drift_sentences(result: SearchResult) -> list[str]:
     """A change along the records that does not make the verdict."""
-    if result.drift is None or drive_unknown(result) or (verdict.kind == OUTSIDE and turned_by_drift(result)):
+    if result.drift is None or drive_unknown(result) or decisive_drift(result) is not None:
         return []
     return [f"Besides, {_changes(result, result.drift)}."]
 
