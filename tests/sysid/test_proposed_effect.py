@@ -6,12 +6,15 @@ import inspect
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.registry import Library, library, load_effect
 from hydraulic_sysid.data.display import UNITS
+from hydraulic_sysid.diagnosis.proposed_effect import proposal
 from hydraulic_sysid.diagnosis.proposed_effect.effect_file import effect_text, per
 from hydraulic_sysid.diagnosis.proposed_effect.laws import (
     FINE,
@@ -152,6 +155,32 @@ def test_a_spline_is_constant_where_the_variable_seldom_is() -> None:
     found = best_law(replace(every, normal=seldom, usual=(-0.5, 0.5)), short=False)
     assert found is not None and found.knots is not None and np.abs(found.knots).max() == 0.5
     assert np.abs(found.values(np.array([-1.0, 1.0]))).max() < 2.0
+
+
+def test_a_curve_with_which_the_plant_does_not_run_is_begun_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To first order a curve may be many times what it is."""
+    hat = load_effect(next(f for f in FILES if f.stem == "unknown_conductance")).effect
+    place = proposal.Place(None, hat, 0, "position", np.array([-0.3, 0.3]))  # type: ignore[arg-type]
+    law = FittedLaw(spline(3), 1e-9 * np.ones(3), (), 1.0, -1.0, np.linspace(-0.3, 0.3, 3))
+    begun = []
+
+    def fitted(part, candidate, file, records):
+        begun.append(candidate.fitted.coefficients[0])
+        if begun[-1] > 5e-10:
+            raise SimulationError("state is not finite")
+        return SimpleNamespace(cost=10.0, candidate=candidate)
+
+    for name, stub in {
+        "_candidates": lambda *_: [proposal.Candidate(place, law.knots, law)],
+        "_fitted": fitted,
+        "_cost": lambda _: 100.0,
+        "unexplained": lambda _: 95.0,
+        "_law": lambda _: None,
+    }.items():
+        monkeypatch.setattr(proposal, name, stub)
+    found = proposal.propose(SimpleNamespace(at=None, curves=[], beside=()), "worn", ["a"])  # type: ignore[arg-type]
+    assert found is not None and found.share == pytest.approx(90 / 95)
+    assert begun == pytest.approx([1e-9, 3e-10])
 
 
 def test_the_name_of_a_record_runs_nothing(tmp_path: Path) -> None:

@@ -124,7 +124,7 @@ class Parameters:
         """Changed by so many scales (P,), within the bounds."""
         values = self.values + change * self.scales
         round_it = np.isfinite(self.period) & ((values < self.low) | (values > self.high))
-        middle, turn = (0.5 * (self.low + self.high))[round_it], self.period[round_it]
+        middle, turn = 0.5 * (self.low[round_it] + self.high[round_it]), self.period[round_it]
         values[round_it] -= turn * np.round((values[round_it] - middle) / turn)
         return replace(self, values=np.clip(values, self.low, self.high))
 

@@ -46,6 +46,7 @@ PERIODIC_PLACES = (
 )  # fmt: skip
 """Where something may go round and round: threads and magnets, neighbouring machines, pumps, ports."""
 LEAST = 0.5  # of what noise does not explain, which a law must explain to be worth a file
+SHARES = (1.0, 0.3, 0.1)  # of a curve, from which its fit begins: to first order it is often too large to run
 _FIRST = FitSettings(most_steps=8, least_gain=5e-3)
 _USUAL = (0.01, 0.99)  # quantiles of a variable between which a spline has its knots
 _EDGE = 0.02  # of the range of a variable, by which knots reach beyond it
@@ -83,7 +84,7 @@ class ProposedEffect:
 
 
 @dataclass(frozen=True)
-class _Candidate:
+class Candidate:
     """A place and variable with a law there, and by how much it lowers the sum of squares."""
 
     place: Place
@@ -95,12 +96,16 @@ class _Candidate:
         """The variable."""
         return self.place.variable.replace("_", " ")
 
+    def times(self, share: float) -> Candidate:
+        """The same law, of a part of its size."""
+        return replace(self, fitted=replace(self.fitted, coefficients=share * self.fitted.coefficients))
+
 
 @dataclass(frozen=True)
 class _Fit:
     """A candidate that was put into the model and fitted: where, and the sum of squares that it leaves."""
 
-    candidate: _Candidate
+    candidate: Candidate
     at: Linearisation
     cost: float
     values: Array
@@ -120,10 +125,13 @@ def propose(
         found = []
         for number, candidate in enumerate(_candidates(part, curves, say)[:MOST_FITTED]):
             say(f"fitting a curve over {candidate.words}")
-            try:
-                found.append(_fitted(part, candidate, Path(folder) / str(number) / f"{name}.py", records))
-            except HydraulicError:  # the plant does not run with it
-                continue
+            for share in SHARES:
+                try:
+                    file = Path(folder) / f"{number}_{share}" / f"{name}.py"
+                    found.append(_fitted(part, candidate.times(share), file, records))
+                    break
+                except HydraulicError:  # the plant does not run with it
+                    continue
         if not found:
             return None
         first = min(found, key=lambda f: f.cost)
@@ -146,7 +154,7 @@ def propose(
 
 def _candidates(
     part: Linearisation, curves: Sequence[NonparametricCurve], say: Callable[[str], None]
-) -> list[_Candidate]:
+) -> list[Candidate]:
     """The best places with splines, the one that explains most first; those near it alone."""
     if not curves:
         return []
@@ -164,13 +172,13 @@ def _candidates(
     return [c for c in every if c.fitted.reduction >= NEAR * every[0].fitted.reduction]
 
 
-def _candidate(part: Linearisation, place: Place, number: int) -> _Candidate | None:
+def _candidate(part: Linearisation, place: Place, number: int) -> Candidate | None:
     laid = curve_between(part, place, *_extent(place.values), number)
     if laid is None:
         return None
     knots, normal = laid
     fitted = best_law(_equations(part, place, normal, knots, _cost(part)), short=number == PERIODIC)
-    return None if fitted is None else _Candidate(place, knots, _in_units(fitted, place))
+    return None if fitted is None else Candidate(place, knots, _in_units(fitted, place))
 
 
 def _equations(
@@ -184,7 +192,7 @@ def _in_units(fitted: FittedLaw, place: Place) -> FittedLaw:
     return replace(fitted, coefficients=fitted.coefficients * place.height.default)
 
 
-def _fitted(part: Linearisation, candidate: _Candidate, file: Path, records: Sequence[str]) -> _Fit:
+def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequence[str]) -> _Fit:
     """A candidate's law in the model, fitted with all else that is free, and held there."""
     place, fitted, name = candidate.place, candidate.fitted, file.stem
     file.parent.mkdir()
@@ -212,7 +220,7 @@ def _priors(part: Linearisation) -> Priors:
     return {k: (float(m), float(s)) for k, m, s in zip(p.keys, p.mean, p.std, strict=True) if np.isfinite(s)}
 
 
-def _law(fit: _Fit) -> _Candidate | None:
+def _law(fit: _Fit) -> Candidate | None:
     """The candidate with the law that explains most where it was fitted."""
     place, knots = fit.candidate.place, fit.candidate.knots
     every = places(fit.at, lambda _: None, (place.effect.name,))
