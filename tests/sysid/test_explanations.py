@@ -210,6 +210,20 @@ def test_what_was_found_is_the_best_so_far_where_the_time_ends_in_what_follows(
     assert found.final.model.effects == known.model.effects
 
 
+def test_the_values_of_a_model_are_those_of_its_laws_as_they_stand(model: Model, runs) -> None:
+    """A search lets every law be off a little in each segment, and then hardly sees that a value is off as much."""
+    search = Search.of(model, records(runs, filtered=True), [], FitSettings(), lambda _: None)
+    base = search.begin()
+    laws = [s.nuisance.shape[-1] - 2 * sum(map(len, s.hum)) for s in search.split.segments]
+    assert laws == [2, 2, 2] and all(s.hum for s in search.split.segments)
+    assert [s.with_exact_laws().nuisance.shape[-1] for s in search.split.segments] == [6, 6, 6], "a line per channel"
+    off = {key: 1.02 * base.model.value(key) for key in base.model.free_keys()}
+    done = search.with_exact_laws(base.model.with_values(off), search.split)
+    assert done.value("valve_flow") == pytest.approx(model.value("valve_flow"), rel=5e-4)
+    # Friction is a small part of the force here.
+    assert done.value("viscous_friction.coefficient") == pytest.approx(164.0, rel=0.03)
+
+
 @pytest.mark.thorough
 def test_slow_transducers_are_a_matter_of_the_recording(model: Model, runs) -> None:
     """They ring on from one segment into the next."""

@@ -71,7 +71,7 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
         off = _raw_columns(s, columns[i], shares)
         hum = _hum(s, [lines[c] for c in s.channels], [noise[c].std for c in s.channels])
         judged = judged.with_noise([noise[c] for c in s.channels])
-        raw = np.concatenate((off, hum, s.disturbance), axis=-1)
+        raw = np.concatenate((off, hum, s.disturbance), axis=-1)  # in this order: `Segments.with_exact_laws`
         found.append(replace(judged, nuisance=judged.whitened(raw)))
     return found
 

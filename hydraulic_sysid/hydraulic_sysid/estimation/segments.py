@@ -327,6 +327,11 @@ class Segments:
                 prior[:, place] *= noise[channel].std / self.noise[channel].std
         return replace(self, noise=tuple(noise), prior_std=prior, nuisance=self.nuisance[..., :0])
 
+    def with_exact_laws(self) -> Segments:
+        """The same, of the nuisance only what the recording adds: hum and disturbances of the drive."""
+        laws = self.nuisance.shape[-1] - 2 * sum(map(len, self.hum)) - self.disturbance.shape[-1]
+        return replace(self, nuisance=self.nuisance[..., laws:])
+
 
 def segment_length(model: Model, records: Sequence[Record]) -> float:
     """Seconds of a segment, from the oil's natural frequency with the piston in mid stroke and the sampling."""

@@ -116,10 +116,14 @@ def diagnose(
             curves = curves if outside else []
         beside = () if suspect is found.base else tuple(found.added)
         remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
+        found = found if outside else search.with_final_values(found)
         known = parameter_errors(found.final.linearisation, tolerances(found.model))
         whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
         done = as_filed(finished(found, known), model)
-        competing = {name: as_filed(other, model) for name, other in verdicts.alternatives(found, verdict).items()}
+        competing = {
+            name: as_filed(search.with_exact_laws(other, found.split), model)
+            for name, other in verdicts.alternatives(found, verdict).items()
+        }
         tied = [name for name in verdict.added if verdict.indistinguishable_from(name)]
         if verdict.kind == verdicts.INDISTINGUISHABLE and tied:
             competing["+".join(tied)] = done

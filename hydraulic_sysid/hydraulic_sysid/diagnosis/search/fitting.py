@@ -135,6 +135,19 @@ class Fitting:
             progress=lambda *_: self.say.left(), priors=self.priors, starts=self.starts(smooth),
         )  # fmt: skip
 
+    def with_exact_laws(self, model: Model, split: Split) -> Model:
+        """A fitted model with the values that fit best where all laws are as they stand.
+
+        A search lets them be off a little, each in each segment on its own, so that their details turn no verdict. What
+        the model is used for afterwards has one value for all.
+        """
+        smooth = self._smooth(model)
+        try:
+            done = self.fitted_to([s.with_exact_laws() for s in split.to_fit], smooth, self.settings)
+        except SimulationError:  # it does not run from where the records show the initial states
+            return model
+        return with_fitted_values(model, smooth.with_values(done.values))
+
     def starts(self, smooth: Model) -> KnownStarts | None:
         """Initial states that were fitted with a model's effects, or with the most of them and no others.
 

@@ -119,6 +119,15 @@ class Search(RecordingFits):
             return replace(found, drift=drift(found.final.linearisation, PROMISES * found.final.misfit.least))
         return found
 
+    def with_final_values(self, found: SearchResult) -> SearchResult:
+        """With values of the final model that are to be used, not only compared (`with_exact_laws`)."""
+        if found.stopped or found.by_force is not None:
+            return found
+        self.say("the values of the model")
+        model = self.with_exact_laws(found.final.model, found.split)
+        moved = tuple(replace(d, value=model.value(d.key)) for d in found.moved)
+        return replace(found, final=replace(found.final, model=model), moved=moved)
+
     def so_far(self) -> SearchResult:
         """The best so far: effects added, and the best of those that were tried next, fitted."""
         self.say = replace(self.say, within=None)
