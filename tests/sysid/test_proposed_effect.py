@@ -7,11 +7,13 @@ import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model_file import load_model
 from hydraulic_sim.registry import Library, library, load_effect
 from hydraulic_sysid.data.display import UNITS
 from hydraulic_sysid.diagnosis.proposed_effect import proposal
@@ -157,30 +159,27 @@ def test_a_spline_is_constant_where_the_variable_seldom_is() -> None:
     assert np.abs(found.values(np.array([-1.0, 1.0]))).max() < 2.0
 
 
-def test_a_curve_with_which_the_plant_does_not_run_is_begun_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To first order a curve may be many times what it is."""
-    hat = load_effect(next(f for f in FILES if f.stem == "unknown_conductance")).effect
-    place = proposal.Place(None, hat, 0, "position", np.array([-0.3, 0.3]))  # type: ignore[arg-type]
-    law = FittedLaw(spline(3), 1e-9 * np.ones(3), (), 1.0, -1.0, np.linspace(-0.3, 0.3, 3))
-    begun = []
+@pytest.mark.parametrize(
+    ("costs", "expected"), [({0.3: 7.0, 0.1: 5.0}, 0.1), ({1.0: 9.0, 0.3: 7.0, 0.1: 8.0}, 0.3), ({}, None)]
+)
+def test_a_curve_begins_with_the_part_of_it_that_leaves_least(costs, expected, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To first order a curve may be many times what it is, and then the plant may not even run."""
+    key = "constant_load.load"
+    model = load_model("sample_bench").with_effect("constant_load", {"load": 50.0})
 
-    def fitted(part, candidate, file, records):
-        begun.append(candidate.fitted.coefficients[0])
-        if begun[-1] > 5e-10:
-            raise SimulationError("state is not finite")
-        return SimpleNamespace(cost=10.0, candidate=candidate)
+    def begin(plant, *_, **__):
+        share = round(plant.value(key) / 50.0, 9)
+        if share not in costs:
+            raise SimulationError(f"does not run with {share}")
+        return SimpleNamespace(cost=costs[share])
 
-    for name, stub in {
-        "_candidates": lambda *_: [proposal.Candidate(place, law.knots, law)],
-        "_fitted": fitted,
-        "_cost": lambda _: 100.0,
-        "unexplained": lambda _: 95.0,
-        "_law": lambda _: None,
-    }.items():
-        monkeypatch.setattr(proposal, name, stub)
-    found = proposal.propose(SimpleNamespace(at=None, curves=[], beside=()), "worn", ["a"])  # type: ignore[arg-type]
-    assert found is not None and found.share == pytest.approx(90 / 95)
-    assert begun == pytest.approx([1e-9, 3e-10])
+    monkeypatch.setattr(proposal, "FitPoint", SimpleNamespace(begin=begin))
+    part: Any = SimpleNamespace(split=SimpleNamespace(segments=[]))
+    if expected is None:
+        with pytest.raises(SimulationError, match="does not run with 0.1"):
+            proposal.begun(part, model, [key], [key], {})
+    else:
+        assert proposal.begun(part, model, [key], [key], {}).value(key) == pytest.approx(50.0 * expected)
 
 
 def test_the_name_of_a_record_runs_nothing(tmp_path: Path) -> None:

@@ -16,6 +16,8 @@ import numpy as np
 
 from hydraulic_interfaces.errors import HydraulicError
 from hydraulic_sim.arrays import Array
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import percent
 from hydraulic_sysid.diagnosis.search.candidates import subsystem
@@ -30,7 +32,7 @@ from hydraulic_sysid.diagnosis.search.nonparametric_curves import (
     places,
     unexplained,
 )
-from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
+from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parameters import Priors
 
@@ -46,7 +48,7 @@ PERIODIC_PLACES = (
 )  # fmt: skip
 """Where something may go round and round: threads and magnets, neighbouring machines, pumps, ports."""
 LEAST = 0.5  # of what noise does not explain, which a law must explain to be worth a file
-SHARES = (1.0, 0.3, 0.1)  # of a curve, from which its fit begins: to first order it is often too large to run
+SHARES = (1.0, 0.3, 0.1)  # of a curve, from the best of which its fit begins: to first order it is often far too large
 _FIRST = FitSettings(most_steps=8, least_gain=5e-3)
 _USUAL = (0.01, 0.99)  # quantiles of a variable between which a spline has its knots
 _EDGE = 0.02  # of the range of a variable, by which knots reach beyond it
@@ -96,10 +98,6 @@ class Candidate:
         """The variable."""
         return self.place.variable.replace("_", " ")
 
-    def times(self, share: float) -> Candidate:
-        """The same law, of a part of its size."""
-        return replace(self, fitted=replace(self.fitted, coefficients=share * self.fitted.coefficients))
-
 
 @dataclass(frozen=True)
 class _Fit:
@@ -125,13 +123,10 @@ def propose(
         found = []
         for number, candidate in enumerate(_candidates(part, curves, say)[:MOST_FITTED]):
             say(f"fitting a curve over {candidate.words}")
-            for share in SHARES:
-                try:
-                    file = Path(folder) / f"{number}_{share}" / f"{name}.py"
-                    found.append(_fitted(part, candidate.times(share), file, records))
-                    break
-                except HydraulicError:  # the plant does not run with it
-                    continue
+            try:
+                found.append(_fitted(part, candidate, Path(folder) / str(number) / f"{name}.py", records))
+            except HydraulicError:  # the plant does not run with it
+                continue
         if not found:
             return None
         first = min(found, key=lambda f: f.cost)
@@ -201,6 +196,7 @@ def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequ
     model = replace(part.model, user_effects=(*part.model.user_effects, *hat, file)).with_effect(name)
     own = [f"{name}.{p}" for p in (*fitted.law.coefficients, *fitted.law.shapes)]
     keys, priors = (*part.parameters.keys, *own), _priors(part)
+    model = begun(part, model, own[: len(fitted.coefficients)], keys, priors)
     done = fit_segments(Plant.for_fits(model), part.split.segments, keys, _FIRST, priors=priors)
     for key in own:
         model = model.with_entry(key, free=False)
@@ -209,6 +205,23 @@ def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequ
     number = len(fitted.law.coefficients)
     now = replace(fitted, coefficients=np.array(reached[:number]), shape=tuple(reached[number:]))
     return _Fit(candidate, at, _cost(at), now.values(candidate.knots))
+
+
+def begun(part: Linearisation, model: Model, heights: Sequence[str], keys: Sequence[str], priors: Priors) -> Model:
+    """The model with that part of its curve that leaves least.
+
+    :raises hydraulic_sim.errors.SimulationError: it does not run with any.
+    """
+    costs, why = dict[float, float](), SimulationError("no part of the curve was tried")
+    begun = {share: model.with_values({k: share * model.value(k) for k in heights}) for share in SHARES}
+    for share, one in begun.items():
+        try:
+            costs[share] = FitPoint.begin(Plant.for_fits(one), part.split.segments, keys, priors=priors).cost
+        except SimulationError as error:
+            why = error
+    if not costs:
+        raise why
+    return begun[min(costs, key=lambda share: costs[share])]
 
 
 def _cost(at: Linearisation) -> float:
