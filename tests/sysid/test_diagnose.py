@@ -259,6 +259,14 @@ def test_a_curve_that_explains_nothing_is_not_what_it_looks_like(model, share: f
     assert said in verdict.sentences(found, verdict.Verdict(verdict.OUTSIDE, [], {}, {}), [curve])
 
 
+@pytest.mark.parametrize(("after", "said"), [(12000.0, "residual falls from"), (36000.0, "residual goes from")])
+def test_what_rises_is_not_said_to_fall(model, after: float, said: str) -> None:
+    base, final = state(model, 30000.0, {}), state(model.with_effect("constant_load"), after, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
+    judged = verdict.Verdict(verdict.OUTSIDE, ["constant_load"], {}, {})
+    assert said in verdict.sentences(found, judged, [])
+
+
 @pytest.mark.parametrize(
     ("after", "share", "kind"),
     [
@@ -364,6 +372,7 @@ def test_beside_what_explains_much_a_parameter_must_explain_more(model, explaine
         (1.04, 1.032, False),  # what was left would be called complete, and most of it stays
         (1.04, 1.0, True),
         (1.39, 1.2, True),  # something was missing: the verdict says how well it is explained
+        (1.39, 1.4, False),  # what it explained was noise that had been judged without it
     ],
 )
 def test_where_nothing_need_be_missing_an_effect_must_explain_what_is_left(model, before, after, named) -> None:

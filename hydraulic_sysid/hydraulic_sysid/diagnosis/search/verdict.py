@@ -235,7 +235,8 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     base, final = result.before_over_noise.rms_validation, result.final.misfit.rms_validation
     left = " ".join([remainder_sentence(result.remainders), *noise_sentences(result)])
     aside = [*paired_sentences(result), *set_aside_sentences(result.split.set_aside)]
-    fell = f"On validation data the residual falls from {base:.3g} to {final:.3g} × noise."
+    how = "falls" if final < base else "goes"
+    fell = f"On validation data the residual {how} from {base:.3g} to {final:.3g} × noise."
     if verdict.kind == UNDECIDED:
         reached = (
             f"{_and(result.added)} added. {fell}" if result.added else f"no effect added, {final:.3g} × noise left."

@@ -125,13 +125,15 @@ def nothing_gained(before: Misfit, after: Misfit) -> bool:
 def decisive(found: SearchResult) -> SearchResult:
     """A search without the effects that its data do not name.
 
-    None where nothing was left before and they take nothing off it (a converter's steps, whose size every record
-    shows, below its noise), or so little was left that nothing need be missing and they leave much of that; no
+    None where they take nothing off what was left (as they did while noise was judged without them), or nothing was left
+    before (a converter's steps, whose size every record shows, below its noise), or so little that nothing need be
+    missing and they leave much of that; no
     further one without which nothing is left either, and none that explains little and may as well be something of
     another subsystem: that is how far laws are off those of the bench.
     """
     base, final = found.base.misfit, found.final.misfit
-    if found.added and (nothing_gained(base, final) or leaves_most(base, final, found.base.immaterial)):
+    vain = not material(base, final) or nothing_gained(base, final)
+    if found.added and (vain or leaves_most(base, final, found.base.immaterial)):
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
         if needless(found, name) or vague(found, name):
