@@ -125,11 +125,10 @@ def nothing_gained(before: Misfit, after: Misfit) -> bool:
 def decisive(found: SearchResult) -> SearchResult:
     """A search without the effects that its data do not name.
 
-    None where they take nothing off what was left (as they did while noise was judged without them), or nothing was left
+    None where they take nothing off what was left (they did while noise was judged without them), or nothing was left
     before (a converter's steps, whose size every record shows, below its noise), or so little that nothing need be
-    missing and they leave much of that; no
-    further one without which nothing is left either, and none that explains little and may as well be something of
-    another subsystem: that is how far laws are off those of the bench.
+    missing and they leave much of that; no further one without which nothing is left either, and none that explains
+    little and may as well be something of another subsystem: that is how far laws are off those of the bench.
     """
     base, final = found.base.misfit, found.final.misfit
     vain = not material(base, final) or nothing_gained(base, final)
