@@ -223,6 +223,13 @@ def test_the_values_of_a_model_are_those_of_its_laws_as_they_stand(model: Model,
     # Friction is a small part of the force here.
     assert done.value("viscous_friction.coefficient") == pytest.approx(164.0, rel=0.03)
 
+    search.say = replace(search.say, within=1e-9)  # the time of the search is over: a part was kept for this
+    ended = SearchResult(search.given, search.split, search.settings, replace(base, refits=[]), base, {}, {})
+    ended = replace(ended, final=replace(base, model=base.model.with_values(off)))
+    for stopped in (False, True):
+        kept = search.with_final_values(replace(ended, stopped=stopped)).final.model.value("valve_flow")
+        assert (kept == off["valve_flow"]) is stopped, "the best so far is as it is"
+
 
 @pytest.mark.thorough
 def test_slow_transducers_are_a_matter_of_the_recording(model: Model, runs) -> None:

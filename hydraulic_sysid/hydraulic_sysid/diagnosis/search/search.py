@@ -120,7 +120,11 @@ class Search(RecordingFits):
         return found
 
     def with_final_values(self, found: SearchResult) -> SearchResult:
-        """With values of the final model that are to be used, not only compared (`with_exact_laws`)."""
+        """With values of the final model that are to be used, not only compared (`with_exact_laws`).
+
+        The search is done: its time may be over meanwhile, as a part was kept for this.
+        """
+        self.say = replace(self.say, within=None)
         if found.stopped or found.by_force is not None:
             return found
         self.say("the values of the model")
