@@ -162,6 +162,16 @@ def test_spikes_are_found_and_peaks_of_pressure_are_not() -> None:
     assert np.array_equal(np.flatnonzero(spikes(spoiled)), places)
 
 
+def test_a_record_without_a_quiet_segment_says_nothing_of_the_noise() -> None:
+    """All of it may be far off the others."""
+    quiet = np.random.default_rng(6).standard_normal((30, 200))
+    parts = [quiet, np.zeros((0, 200))]
+    noise = estimate(parts, DT)
+    assert noise.innovation == estimate([quiet], DT).innovation
+    found = noise_model.loudness(parts, noise)
+    assert np.array_equal(found[0], np.ones(30)) and found[1].shape == (0,)
+
+
 def test_noise_that_is_louder_in_some_segments_has_its_strength_there() -> None:
     strength = np.repeat([1.0, 1.6], 30)
     loud = [strength[:, None] * np.random.default_rng(3).standard_normal((60, 500))]

@@ -90,7 +90,7 @@ class ChannelNoise:
     def whiten(self, values: Array) -> Array:
         """(S, n, …) along the second axis, n > p: unit variance and no colour where ``values`` are this noise."""
         width = int(np.prod(values.shape[2:]))
-        rows = np.ascontiguousarray(values, dtype=float).reshape(len(values), -1)
+        rows = np.ascontiguousarray(values, dtype=float).reshape(len(values), values.shape[1] * width)
         return np.asarray(whitened(rows, width, self.filter, self.head)).reshape(values.shape)
 
     def missing(self, outliers: Mask) -> list[tuple[int, Array]]:
