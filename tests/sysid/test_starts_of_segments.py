@@ -198,6 +198,27 @@ def test_a_fit_begins_where_the_last_one_ended(model: Model, segments: list[Segm
     assert FitPoint.begin(plant, segments, (), starts=wrong).cost == begin.cost
 
 
+def test_initial_states_stay_where_they_are_where_moved_the_plant_does_not_run(
+    model: Model, segments: list[Segments], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant = Plant.for_fits(model)
+    shooting = Shooting(plant, segments)
+    begin = shooting.initial_states
+    before = shooting.projections(plant, begin)
+    moved = shooting.improved(plant, begin, before)[0]
+    assert not np.array_equal(moved[0], begin[0])
+    run = Shooting.residuals
+
+    def residuals(self: Shooting, plant: Plant, states: list[Array]) -> list[Array]:
+        if not np.array_equal(states[0], begin[0]):
+            raise SimulationError("a state is no longer finite")
+        return run(self, plant, states)
+
+    monkeypatch.setattr(Shooting, "residuals", residuals)
+    states, left = shooting.improved(plant, begin, before)
+    assert states[0] is begin[0] and left[0] is before[0]
+
+
 def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(
     model: Model, segments: list[Segments]
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
@@ -142,7 +143,8 @@ class Shooting:
         states, best = list(initial_states), list(before)
         for share in shares:
             moved = self.corrected(initial_states, before, [share * p.raw for p in before])
-            states, best = better_of((states, best), (moved, self._seen_from(before, plant, moved)))
+            with suppress(SimulationError):  # from so far off it does not run
+                states, best = better_of((states, best), (moved, self._seen_from(before, plant, moved)))
         return states, best
 
     def better(
