@@ -195,14 +195,14 @@ def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequ
     hat = [f for f in FILES if f.stem == place.effect.name]  # is needed when the law is taken: compiled once for both
     model = replace(part.model, user_effects=(*part.model.user_effects, *hat, file)).with_effect(name)
     own = [f"{name}.{p}" for p in (*fitted.law.coefficients, *fitted.law.shapes)]
+    number = len(fitted.law.coefficients)
     keys, priors = (*part.parameters.keys, *own), _priors(part)
-    model = begun(part, model, own[: len(fitted.coefficients)], keys, priors)
+    model = begun(part, model, own[:number], keys, priors)
     done = fit_segments(Plant.for_fits(model), part.split.segments, keys, _FIRST, priors=priors)
     for key in own:
         model = model.with_entry(key, free=False)
     at = Linearisation.of(model.with_values(done.values, source="fitted"), part.split, priors)
     reached = [at.model.value(key) for key in own]
-    number = len(fitted.law.coefficients)
     now = replace(fitted, coefficients=np.array(reached[:number]), shape=tuple(reached[number:]))
     return _Fit(candidate, at, _cost(at), now.values(candidate.knots))
 
@@ -213,15 +213,15 @@ def begun(part: Linearisation, model: Model, heights: Sequence[str], keys: Seque
     :raises hydraulic_sim.errors.SimulationError: it does not run with any.
     """
     costs, why = dict[float, float](), SimulationError("no part of the curve was tried")
-    begun = {share: model.with_values({k: share * model.value(k) for k in heights}) for share in SHARES}
-    for share, one in begun.items():
+    models = {share: model.with_values({k: share * model.value(k) for k in heights}) for share in SHARES}
+    for share, one in models.items():
         try:
             costs[share] = FitPoint.begin(Plant.for_fits(one), part.split.segments, keys, priors=priors).cost
         except SimulationError as error:
             why = error
     if not costs:
         raise why
-    return begun[min(costs, key=lambda share: costs[share])]
+    return models[min(costs, key=lambda share: costs[share])]
 
 
 def _cost(at: Linearisation) -> float:

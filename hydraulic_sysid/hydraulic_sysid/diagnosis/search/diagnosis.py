@@ -116,7 +116,8 @@ def diagnose(
             curves = curves if outside else []
         beside = () if suspect is found.base else tuple(found.added)
         remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
-        found = found if outside else search.with_final_values(found)
+        if not outside:  # else nothing says of any model that it is right
+            found = search.with_final_values(found)
         known = parameter_errors(found.final.linearisation, tolerances(found.model))
         whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
         done = as_filed(finished(found, known), model)
