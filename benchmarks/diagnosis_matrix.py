@@ -4,8 +4,9 @@
     ./bench shell -- python benchmarks/diagnosis_matrix.py [--only NAME …] [--kind KIND] [--severity mild|strong]
 
 The first runs N benches (per seed) of the family: geometry, sensors, loop and data sheet at random, with nothing, an
-effect, a wrong number or a fault of the recording hidden (--what none|effect|datum|recording: that alone). The second
-runs the sample benches. Figures that are published come from seeds that nothing was chosen on.
+effect, a wrong number or a fault of the recording hidden (--what none|effect|datum|recording: that alone; or
+pair|triple|unknown, which are drawn only so). The second runs the sample benches. Figures that are published come from
+seeds that nothing was chosen on.
 
 Benches come from the independent plant in hidden_effects/. The run is a campaign: each bench's outcome is kept in the
 folder --out, a run continues where it was ended, and --scheduler takes the workers of a Dask cluster (which must find

@@ -20,13 +20,16 @@ SIZE_SCATTER = 0.15
 # plant parameter of a plain bench → the effect that a user's model file has for it, unless it is hidden or 0
 KNOWN = {"viscous": "viscous_friction", "coulomb": "coulomb_friction", "leakage": "internal_leakage",
          "load": "constant_load", "spool_frequency": "spool_dynamics"}  # fmt: skip
+# number of the data sheet that a model file gives without bounds → its plant parameter
+STATED = {"piston_area_a": "area", "piston_area_b": "area_b", "dead_volume_a": "dead_volume",
+          "dead_volume_b": "dead_volume_b", "supply_pressure": "supply"}  # fmt: skip
 NONE_SEEDS = 12
 
 
 @dataclass(frozen=True)
 class Bench:
-    """One bench. kind: single, none, pair, unknown, recording or datum; effects: names in `catalogue.EVERY`; severity:
-    mild, strong or empty (none). Everything else follows from the seed."""
+    """One bench. kind: single, none, pair, triple, unknown, recording or datum; effects: names in `catalogue.EVERY`;
+    severity: mild, strong or empty (none). Everything else follows from the seed."""
 
     kind: str
     effects: tuple[str, ...] = ()

@@ -1,5 +1,6 @@
 """A family of benches: any geometry, sensors, loop and data sheet, with nothing, one effect, a wrong number or a fault
-of the recording hidden. Every member follows from the draw's seed and its own number, whatever else is drawn."""
+of the recording hidden, or, when asked for, two or three effects or one that the library lacks. Every member follows
+from the draw's seed and its own number, whatever else is drawn."""
 
 from __future__ import annotations
 
@@ -12,8 +13,11 @@ from . import sensors as instruments
 from .benches import SEVERITIES, Bench
 from .geometry import GEOMETRIES, Geometry
 
-WHAT = {"none": 0.3, "effect": 0.4, "datum": 0.15, "recording": 0.15}  # what is hidden, and how often
-KINDS = {"none": "none", "effect": "single", "datum": "datum", "recording": "recording"}
+WHAT = {"none": 0.3, "effect": 0.4, "datum": 0.15, "recording": 0.15,
+        "pair": 0.0, "triple": 0.0, "unknown": 0.0}  # fmt: skip
+"""What is hidden, and how often; what has 0 is drawn only when asked for."""
+KINDS = {what: what for what in WHAT} | {"effect": "single"}
+TOGETHER = {"pair": 2, "triple": 3}  # kind → effects of the library that are hidden together
 AMBIGUOUS = ("sensor_scale",)  # areas within their tolerance, and masses, say the same
 APART = 100_000  # between the benches' seeds of two draws
 
@@ -34,7 +38,17 @@ def member(seed: int, number: int, what: str | None = None) -> Bench:
     if kind == "none":
         return Bench(kind, seed=seed, setting=setting)
     severity = str(rng.choice(SEVERITIES))
-    return Bench(kind, (str(rng.choice(possible(geometry, kind, severity))),), severity, seed, setting)
+    return Bench(kind, _hidden(rng, geometry, kind, severity), severity, seed, setting)
+
+
+def _hidden(rng: np.random.Generator, geometry: Geometry, kind: str, severity: str) -> tuple[str, ...]:
+    """What a bench hides; effects that are hidden together are each of another subsystem."""
+    if kind not in TOGETHER:
+        return (str(rng.choice(possible(geometry, kind, severity))),)
+    chosen: dict[str, str] = {}
+    for name in rng.permutation(possible(geometry, "single", severity)).tolist():
+        chosen.setdefault(catalogue.LIBRARY[name].subsystems[0], name)
+    return tuple(chosen.values())[: TOGETHER[kind]]
 
 
 def possible(geometry: Geometry, kind: str, severity: str) -> list[str]:

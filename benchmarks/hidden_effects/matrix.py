@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import resource
 import tempfile
 import time
@@ -21,8 +22,11 @@ from . import benches, catalogue, family, scoring
 
 ROOT = Path(__file__).resolve().parents[2]
 REMARKS = {"unknown": " (not in the library)", "recording": " (recording)", "datum": " (data sheet)"}
-HIDDEN = {"none": "nothing", "single": "an effect", "pair": "two effects", "unknown": "an unknown effect",
-          "datum": "a wrong number", "recording": "a fault of the recording"}  # fmt: skip
+HIDDEN = {"none": "nothing", "single": "an effect", "pair": "two effects", "triple": "three effects",
+          "unknown": "an unknown effect", "datum": "a wrong number",
+          "recording": "a fault of the recording"}  # fmt: skip
+SHOWS = 1.03  # times the noise's mean square, from which what is left shows an effect
+ROUNDING = "sensor_quantisation"  # whose size every record shows by itself, and by which nothing can be differentiated
 SOURCES = ("hydraulic_sim/hydraulic_sim", "hydraulic_sysid/hydraulic_sysid")
 
 
@@ -51,6 +55,8 @@ def examine(bench: benches.Bench, reference: bool = True, most_values: int = MOS
         new = Path(scratch) / "new"
         fresh = read_all(benches.write_records(again, new, bench.setting.decimals)) if again else []
     answer = bench.answer()
+    if bench.kind in scoring.TOGETHER:
+        answer["visible"] = visible(bench, model, records)
     found: dict[str, Any] = {"version": version(), "answer": answer, "most_values": most_values}
     begin, busy = time.perf_counter(), time.process_time()
     try:
@@ -59,7 +65,7 @@ def examine(bench: benches.Bench, reference: bool = True, most_values: int = MOS
         found["peak_MiB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         found["result"] = plain(diagnosis.result)
         found["marks"] = scoring.judge(answer, found["result"])
-        if reference and bench.kind in ("single", "pair"):
+        if reference and bench.kind in ("single", *scoring.TOGETHER):
             ratio = held_out_ratio(bench, model, diagnosis.model, records, fresh)
             found["marks"] |= ratio
     except Exception:  # a diagnosis that breaks is a wrong one; the reason is kept
@@ -68,6 +74,21 @@ def examine(bench: benches.Bench, reference: bool = True, most_values: int = MOS
         broken = {"verdict": {"kind": "failed", "subsystem": None}, "effects": []}
         found["marks"] = scoring.judge(answer, broken)
     return found
+
+
+def visible(bench: benches.Bench, model: Any, records: Any) -> list[str]:
+    """Effects without which the true structure, fitted from the true values, leaves more than the noise hides."""
+    from hydraulic_sysid.estimation.fit import fit
+
+    true, built = model, bench.plain()
+    for theirs, ours in benches.STATED.items():
+        true = true.with_entry(theirs, value=built[ours])
+    for name, values in bench.truth().items():
+        true = true if name == ROUNDING else true.with_effect(name, values)
+    own = [name for name in bench.effects if name != ROUNDING]
+    least = fit(true, records, true.free_keys()).cost
+    left = {name: fit(true.without_effect(name), records, true.without_effect(name).free_keys()).cost for name in own}
+    return [name for name in bench.effects if left.get(name, math.inf) > SHOWS * least]
 
 
 def held_out_ratio(bench: benches.Bench, model: Any, after: Any, records: Any, fresh: Any) -> dict[str, float]:
@@ -179,9 +200,9 @@ def kept(folder: Path, most_values: int = MOST_VALUES) -> list[dict[str, Any]]:
 
 
 def _judged(document: dict[str, Any], answer: dict[str, Any]) -> dict[str, Any]:
-    document["answer"] = answer
+    document["answer"] = {**document["answer"], **answer}  # it knows which of the effects show
     if "result" in document:
-        document["marks"] |= scoring.judge(answer, document["result"])
+        document["marks"] |= scoring.judge(document["answer"], document["result"])
     return document
 
 

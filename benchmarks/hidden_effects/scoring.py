@@ -11,6 +11,7 @@ from typing import Any
 
 MISSING, TIE, COMPLETE, OUTSIDE = "missing", "indistinguishable", "complete", "outside the library"
 DATA_SHEET, RECORDING = "data sheet", "recording"
+TOGETHER = ("pair", "triple")  # kinds of benches with several effects of the library
 DATUM = "datum"  # kind of a bench with a wrong data sheet
 SURE = 0.95  # probability of a verdict that is said to be sure
 NEAR = 0.10  # of the true value, from the parameter's null
@@ -82,13 +83,17 @@ def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
         marks["right_first"] = (kind == MISSING and names[:1] == true) or tied
         marks["first_three"] = true[0] in marks["shortlist"] or tied
         marks["nothing_beside"] = set(names) <= {*true, *answer["companions"]}
-    elif answer["kind"] == "pair":
-        marks["both_found"] = kind in (MISSING, TIE) and set(true) <= set(names)
-        marks["one_found"] = bool(set(true) & set(names))
+    elif answer["kind"] in TOGETHER:
+        shown = set(answer.get("visible", true))  # what the records do not show is not asked for
+        marks[RIGHT[answer["kind"]]] = (kind in (MISSING, TIE) or not shown) and shown <= set(names)
+        if shown:
+            marks["one_found"] = bool(shown & set(names))
+        marks["only_true"] = set(names) <= {*true, *answer["companions"]}
+        marks["shown"] = sorted(shown)
     elif answer["kind"] == "unknown":
         marks["said_so"] = kind == OUTSIDE
         marks["right_subsystem"] = result["verdict"]["subsystem"] in answer["subsystems_as_good"][0]
-    if answer["kind"] in ("single", "pair"):
+    if answer["kind"] in ("single", *TOGETHER):
         marks["parameters"] = parameters(answer, result)
     marks["probability"] = result["verdict"].get("probability")
     # A tie is right where the truth is among what it names.
@@ -141,7 +146,7 @@ def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
 
 
 # kind of bench → the mark that says whether its diagnosis was right
-RIGHT = {"none": "silent", "single": "right_first", "pair": "both_found", "unknown": "said_so",
+RIGHT = {"none": "silent", "single": "right_first", "pair": "both_found", "triple": "three_found", "unknown": "said_so",
          "datum": "fault_named", "recording": "fault_named"}  # fmt: skip
 
 SAID = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)
@@ -171,9 +176,11 @@ RATES = {
     "false_alarms": ("nothing missing: false alarms", "≤ 5 %"),
     "named_none": ("nothing missing: an effect named", "≤ 3 %"),
     "fault_named": ("wrong datum or recording: named, and no effect", "≥ 90 %"),
-    "both_found": ("two hidden effects: both found", "≥ 80 %"),
-    "one_found": ("two hidden effects: at least one found", ""),
-    "said_so": ("unknown to the library: said so", "≥ 80 %"),
+    "both_found": ("two hidden effects: both found", "≥ 90 %"),
+    "three_found": ("three hidden effects: all found", "≥ 75 %"),
+    "one_found": ("two or three hidden effects: at least one found", ""),
+    "only_true": ("two or three hidden effects: none named that is not there", ""),
+    "said_so": ("unknown to the library: said so", "≥ 90 %"),
     "right_subsystem": ("unknown to the library: right subsystem", "≥ 90 %"),
     "near": ("parameters of the named effect within 10 %", "where identifiable"),
     "covered": ("95 % intervals that cover the truth", "≥ 90 %"),

@@ -139,16 +139,22 @@ def test_wrong_numbers_beside_a_missing_effect_are_named_as_such(model: Model) -
     assert found["residual"]["after"]["validation"] < 1.05
 
 
-@pytest.mark.parametrize(("effect", "size"), [("hose_compliance", 0.4), ("sensor_offset", 0.4)])
-def test_one_effect_is_simpler_than_two_numbers_that_say_the_same(model: Model, effect: str, size: float) -> None:
+@pytest.mark.parametrize(
+    ("effect", "size", "others"), [("hose_compliance", 0.4, {}), ("sensor_offset", 0.4, {"constant_load": 300.0})]
+)
+def test_one_effect_is_simpler_than_two_numbers_that_say_the_same(
+    model: Model, effect: str, size: float, others: Mapping[str, float]
+) -> None:
     """A hose is both dead volumes larger, an offset of the position is one larger and the other smaller."""
     volume = size * model.value("dead_volume_a")
     amount = volume / (model.value("bulk_modulus") if effect == "hose_compliance" else model.value("piston_area_a"))
-    (parameter,) = model.library[effect].parameters
-    bench = model.with_effect(effect, {parameter.name: amount})
+    bench = model
+    for name, value in {effect: amount, **others}.items():
+        (parameter,) = model.library[name].parameters
+        bench = bench.with_effect(name, {parameter.name: value})
     found = document(diagnose(model, records(driven(bench))))
     assert found["verdict"]["kind"] == "missing", found["verdict"]["text"]
-    assert [e["name"] for e in found["effects"] if e["added"]] == [effect] and not found["data_sheet"]
+    assert {e["name"] for e in found["effects"] if e["added"]} == {effect, *others} and not found["data_sheet"]
     assert {d["key"] for d in found["data_sheet_instead"]} <= {"dead_volume_a", "dead_volume_b"}
     assert found["residual"]["after"]["validation"] < 1.05
 

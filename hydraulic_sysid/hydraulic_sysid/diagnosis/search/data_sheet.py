@@ -30,7 +30,7 @@ NAMED = ("piston_area_a", "piston_area_b", "dead_volume_a", "dead_volume_b", "su
 """Base parameters that a data sheet states and a diagnosis leaves as they are."""
 SIGNIFICANT = 25.0  # reduction of the sum of squares, of the variance, for which a number is named …
 PLAUSIBLE = 3.0  # times an effect's default size: a standard deviation of its size
-ROUGH = 0.02  # of what a number explains: what a prediction that far may be off
+ROUGH = 0.02  # of what numbers explain: what a prediction that far may be off
 SURE = 2.0  # standard errors by which a number must be off to be named
 VISIBLE = 0.01  # … at least this share of the number of residuals
 

@@ -6,8 +6,11 @@ In the end only those numbers are others that the records contradict.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
+
+import numpy as np
 
 from hydraulic_sim.errors import SimulationError
 
@@ -15,13 +18,16 @@ from .candidate_fits import FULL, LATER_REFITS, PROMISED, CandidateFits
 from .data_sheet import Deviation, HeldNumbers, least_cost, relaxed, restored, stretched, with_error
 from .fitting import FAR_OFF, worse
 from .misfit import explained, reduction
+from .number_sets import sets_of_one_effect
 from .search_state import SearchResult, SearchState
+from .spectral_lines import record_features
 from .uncertainty import parameter_errors
 from .worth import FURTHER, PROMISES, nothing_gained
 
 WORSE_LOOK = 0.2  # share by which a look at few segments leaves them more: the fit leads to something worse
 SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one, …
 GUESSED = 4  # … unless more than so many are others: then the sheet is a guess, and none can be told from the rest
+MOST_SETS = 2  # of numbers in whose place one effect is tried
 CLEAR = 10.0  # times what names a number, beyond which a fit need not show what keeping it costs
 
 
@@ -51,21 +57,23 @@ class DataSheetFits(CandidateFits):
         helps = self.better(strict, loose) and explained(strict.misfit, loose.misfit) > FURTHER
         return loose if helps else None
 
-    def concluded(self, found: SearchResult) -> SearchResult:
-        """With the data sheet as it was given, but for the few numbers that the records show to be wrong."""
+    def concluded(self, found: SearchResult, others: bool = True) -> SearchResult:
+        """With the data sheet as it was given, but for the few numbers that the records show to be wrong.
+
+        ``others``: whether an effect may take the place of several numbers.
+        """
         base, final = found.base, found.final
         if self._strict(base):
             return found
         strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
         done, moved = self.fewest_moved(final, strict if final is base else None)
-        if not found.added:  # beside an effect, another in the place of a number is no answer that anybody asks for
-            # A wrong area hides what a hose does, too.
-            surest = max(moved, key=lambda d: d.cost, default=None)
-            tried = [tuple(d.key for d in moved), tuple(d.key for d in moved if d is not surest)]
-            for keys in tried:
-                simpler = self.simpler(found, strict, done, moved, keys)
-                if simpler is not None:
-                    return simpler
+        tried = self.of_one_effect(done, moved) if others else []
+        held = self.with_moved(final, ()) if found.added and tried else strict
+        for keys in tried:
+            simpler = self.simpler(found, strict, held, done, moved, keys)
+            if simpler is not None:
+                return simpler
+        if not found.added:  # beside an effect, another in the place of one number is no answer that anybody asks for
             places = [self.in_place_of(strict, done, [d], moved) for d in moved]
             every = [(state, i) for i, (_, states) in enumerate(places) for state in states]
             best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
@@ -84,7 +92,7 @@ class DataSheetFits(CandidateFits):
             ]
             shared = [tuple(d.key for d in moved if name in d.instead) for one in moved for name in one.instead]
             for keys in dict.fromkeys(shared):
-                simpler = None if keys in tried else self.simpler(found, strict, done, moved, keys)
+                simpler = None if keys in tried else self.simpler(found, strict, held, done, moved, keys)
                 if simpler is not None:
                     return simpler
         misfits = found.misfits
@@ -92,27 +100,42 @@ class DataSheetFits(CandidateFits):
             misfits = {**misfits, next(reversed(misfits)): done.misfit}
         return replace(found, base=strict, final=done, misfits=misfits, moved=tuple(moved))
 
+    def of_one_effect(self, done: SearchState, moved: Sequence[Deviation]) -> list[tuple[str, ...]]:
+        """Sets of the numbers ``moved``, each of which one effect may stand for: the likeliest that are tried."""
+        if len(moved) < 2:
+            return []
+        self.say("looking for one effect that does what several numbers do")
+        at = done.linearisation
+        nominal = {d.key: d.nominal for d in moved}
+        return sets_of_one_effect(at, nominal, record_features(at), done.misfit.freedom)[:MOST_SETS]
+
     def simpler(
         self,
         found: SearchResult,
         strict: SearchState,
+        held: SearchState,
         done: SearchState,
         moved: Sequence[Deviation],
         keys: Sequence[str],
     ) -> SearchResult | None:
-        """With the one effect that does what several of the numbers ``moved``, those of ``keys``, do, as BIC has it."""
+        """With the one effect that does what several of the numbers ``moved``, those of ``keys``, do, as BIC has it.
+
+        ``held``: with the effects found and the data sheet as it is; ``strict``: without them.
+        """
         taken = [d for d in moved if d.key in keys]
-        if len(taken) < 2 or not worse(strict.misfit, done.misfit):
+        if len(taken) < 2 or not worse(held.misfit, done.misfit):
             return None
-        without, states = self.in_place_of(strict, done, taken, moved)
+        without, states = self.in_place_of(held, done, taken, moved)
         best = min(states, key=lambda s: s.misfit.total, default=done)
-        spared = (len(taken) - 1) * done.misfit.freedom
+        # Fits end a little above what they come to: what would not count as a reduction is none here, either.
+        spared = (len(taken) - 1) * done.misfit.freedom + done.misfit.least
         if best is done or reduction(best.misfit, done.misfit) > spared or not self.better(without, best):
             return None
-        name = new_effect(best, strict)
+        name = new_effect(best, held)
         return replace(
-            found, base=strict, final=best, misfits={name: best.misfit}, competing={name: without},
-            moved=tuple(d for d in moved if d not in taken), numbers_instead=tuple(taken),
+            found, base=strict, final=best, misfits={**found.misfits, name: best.misfit},
+            competing={**found.competing, name: without}, moved=tuple(d for d in moved if d not in taken),
+            numbers_instead=tuple(taken),
         )  # fmt: skip
 
     def fewest_moved(self, final: SearchState, strict: SearchState | None) -> tuple[SearchState, list[Deviation]]:
@@ -155,26 +178,32 @@ class DataSheetFits(CandidateFits):
         return with_error(held.deviation(key, moved, state.model.value(key)), parameter_errors(state.linearisation))
 
     def in_place_of(
-        self, strict: SearchState, done: SearchState, taken: Sequence[Deviation], moved: Sequence[Deviation]
+        self, held: SearchState, done: SearchState, taken: Sequence[Deviation], moved: Sequence[Deviation]
     ) -> tuple[SearchState, list[SearchState]]:
         """The state with numbers ``taken`` back, and with effects that explain no less than they do.
 
-        ``strict``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
+        ``held``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
         """
         others = [d.key for d in moved if d not in taken]
-        without = self.explore(self.with_moved(done, others) if others else strict, LATER_REFITS)
+        without = self.explore(self.with_moved(done, others) if others else held, LATER_REFITS)
         promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
         found, near = [], [r for r in without.refits if r.misfit.total < promising][:FULL]
         most = (1.0 + WORSE_LOOK) * self.left_on_few(done) if near else 0.0
         for r in near:
-            try:
-                if self.looked_at(r.refit.model) > most:
-                    continue
-                reached = self.state(r.refit.model, self._last)
-            except SimulationError:
+            own = {p.name: r.refit.model.value(f"{r.name}.{p.name}") for p in r.refit.model.library[r.name].parameters}
+            # Without the numbers the other values were bent to imitate them.
+            unbent = restored(done.model, self.given, others).with_effect(r.name, own)
+            looks = []
+            for model in (r.refit.model, unbent):
+                with suppress(SimulationError):
+                    looks.append((self.looked_at(model), model))
+            left, model = min(looks, key=lambda look: look[0], default=(np.inf, unbent))
+            if left > most:
                 continue
-            if not worse(reached.misfit, done.misfit):
-                found.append(reached)
+            with suppress(SimulationError):
+                reached = self.state(model, self._last)
+                if not worse(reached.misfit, done.misfit):
+                    found.append(reached)
         return without, found
 
 

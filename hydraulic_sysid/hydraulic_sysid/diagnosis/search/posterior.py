@@ -124,5 +124,5 @@ def _known(result: SearchResult, verdict: Verdict) -> dict[What, tuple[float, bo
             found.setdefault(((*effects, effect), rest, faults), (1.0, True))
     if result.numbers_instead:
         every = (*numbers, *(d.key for d in result.numbers_instead))
-        found.setdefault(((), every, faults), (1.0 / ODDS, False))
+        found.setdefault((effects[:-1], every, faults), (1.0 / ODDS, False))
     return found

@@ -248,7 +248,7 @@ class Search(RecordingFits):
         self.say.reached([name], final.misfit)
         base = replace(self.state(base.model, self._last), refits=[tried], scores=scores)
         found = SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
-        found = self.concluded(found)
+        found = self.concluded(found, others=False)
         return accidents_named(self.with_force(found, base.model, scores) if judged_by_force(base) else found)
 
     def _reviewed(

@@ -81,8 +81,8 @@ class SearchResult:
 
     ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
     ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the state
-    before any fault of the recording was assumed; ``drift``: of the final model along the records; ``faults_instead``
-    and ``numbers_instead``: that explain what the one effect added does, the latter only together.
+    before any fault of the recording was assumed; ``drift``: of the final model along the records; ``faults_instead``:
+    that explain what the one effect added does; ``numbers_instead``: what the effect added last does, only together.
     """
 
     model: Model

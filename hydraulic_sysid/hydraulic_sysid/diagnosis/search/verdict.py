@@ -462,7 +462,9 @@ def _instead(verdict: Verdict) -> list[str]:
 
 def _numbers(result: SearchResult) -> list[str]:
     found = result.numbers_instead
-    return [f"Together, {_and([d.key for d in found])} would explain as much: check them."] if found else []
+    if not found:
+        return []
+    return [f"Together, {_and([d.key for d in found])} would explain as much as {result.added[-1]}: check them."]
 
 
 def _and(words: Sequence[str]) -> str:
