@@ -32,6 +32,7 @@ from hydraulic_sysid.diagnosis.search.verdict import (
     OUTSIDE,
     UNDECIDED,
     Verdict,
+    kind_of,
 )
 from hydraulic_sysid.estimation.fit import FitSettings
 
@@ -140,7 +141,16 @@ def test_no_probability_is_stated_where_it_says_nothing(model: Model, kind: str,
     assert found == [] and probability(found) is None and sentence(found) == ""
 
 
-def test_a_number_that_leaves_much_of_the_motion_is_improbable(model: Model) -> None:
-    ended = replace(result(model, 100.0, 2.5), moved=(Deviation("supply_pressure", 14e6, 13.5e6, 1e4, 500.0),))
-    ended.__dict__["remainders"] = [Remainder("position", 0.1, 0.1, 1.0)]
-    assert 0.5 < cast(float, probability(explanations(ended, verdict(DATA_SHEET)))) < 0.75
+def test_numbers_have_no_law_that_may_be_off(model: Model) -> None:
+    """What they leave beyond the noise is missing, however much they explain; unless it is nothing to anybody."""
+    number = Deviation("supply_pressure", 14e6, 13.5e6, 1e4, 500.0)
+
+    def ended(after: float, beyond: float) -> SearchResult:
+        found = replace(result(model, 100.0, after), moved=(number,))
+        found.__dict__["remainders"] = [Remainder("position", beyond, 1e-4, 1.0)]
+        return found
+
+    much, unnoticed, nothing = ended(2.5, 0.1), ended(1.15, 0.002), ended(1.0, 0.0)
+    assert [kind_of(found, tied=False) for found in (much, unnoticed, nothing)] == [OUTSIDE, DATA_SHEET, DATA_SHEET]
+    assert cast(float, probability(explanations(much, verdict(DATA_SHEET)))) < 0.5
+    assert cast(float, probability(explanations(nothing, verdict(DATA_SHEET)))) > 0.8

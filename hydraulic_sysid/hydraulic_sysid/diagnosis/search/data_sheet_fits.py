@@ -127,11 +127,13 @@ class DataSheetFits(CandidateFits):
             return None
         without, states = self.in_place_of(held, done, taken, moved)
         best = min(states, key=lambda s: s.misfit.total, default=done)
-        # Fits end a little above what they come to: what would not count as a reduction is none here, either.
-        spared = (len(taken) - 1) * done.misfit.freedom + done.misfit.least
-        if best is done or reduction(best.misfit, done.misfit) > spared or not self.better(without, best):
+        if best is done:
             return None
         name = new_effect(best, held)
+        spared = len(taken) - sum(p.free for p in best.model.library[name].parameters)
+        lost = reduction(best.misfit, done.misfit)
+        if spared < 1 or lost > spared * done.misfit.freedom or not self.better(without, best):
+            return None
         return replace(
             found, base=strict, final=best, misfits={**found.misfits, name: best.misfit},
             competing={**found.competing, name: without}, moved=tuple(d for d in moved if d not in taken),

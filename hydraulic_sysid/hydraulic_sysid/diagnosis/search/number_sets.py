@@ -26,7 +26,9 @@ from .score_test import ENOUGH
 def sets_of_one_effect(
     at: Linearisation, nominal: Mapping[str, float], features: RecordFeatures, freedom: float
 ) -> list[tuple[str, ...]]:
-    """Sets of the wrong numbers ``nominal`` [SI, by key] for which one effect does; the likeliest first.
+    """Sets of the wrong numbers ``nominal`` [SI, by key] for which one effect of fewer parameters does.
+
+    The likeliest first.
 
     :param at: the fit in which they have the values that the records ask for
     :param freedom: what a number that is spared is worth of the sum of squares
@@ -43,7 +45,8 @@ def sets_of_one_effect(
     for information in chain.from_iterable(normals):
         beside = np.concatenate((off, np.zeros(len(information) - len(off))))
         left = {held: _cost(information, beside, held) for held in sets}
-        likely = {h: left[h] / share - len(h) * freedom for h in sets if left[h] < ROUGH * alone[h]}
+        simpler = [h for h in sets if len(h) > len(information) - len(off) and left[h] < ROUGH * alone[h]]
+        likely = {h: left[h] / share - len(h) * freedom for h in simpler}
         if likely:
             chosen = min(likely, key=lambda held: likely[held])
             keys = tuple(own.keys[i] for i in chosen)

@@ -69,7 +69,7 @@ def explanations(result: SearchResult, verdict: Verdict, calibration: Calibratio
     moot = settled and not final.little and immaterial(final, result.remainders)
     if verdict.kind == UNDECIDED or result.by_force is not None or moot:
         return []
-    unknown = probability_of_unknown(result.before_over_noise, final, calibration)
+    unknown = probability_of_unknown(result.before_laws, final, calibration)
     if verdict.kind == OUTSIDE:
         # Not by what is left alone: a drift, a law bent to its limits. What is said is no less probable than all else.
         by_drift = decisive_drift(result) is not None

@@ -117,6 +117,11 @@ class SearchResult:
         return self.before.times(ratio)
 
     @property
+    def before_laws(self) -> Misfit:
+        """The same, or the end where only numbers of the data sheet are others: they have no law that may be off."""
+        return self.before_over_noise if self.added or self.faults else self.final.misfit
+
+    @property
     def unexplained_share(self) -> float:
         """What is left in the end, of what was there before anything was explained (0…1); of the force, if by that."""
         if self.by_force is not None:

@@ -148,7 +148,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     little = final.little or immaterial(final, result.remainders) or result.by_force is not None
     if not result.added:
         # Faults of the recording may have explained the most of it.
-        if not little and result.unexplained_share > UNEXPLAINED:
+        if not little and unexplained_share(result.before_laws, final) > UNEXPLAINED:
             return RECORDING if drive_blamed(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if strained(result) and not tied:
