@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from hidden_effects import benches, catalogue, family, motion, scoring, sensors, settings
+from hidden_effects import benches, catalogue, family, matrix, motion, scoring, sensors, settings
 from hidden_effects.geometry import GEOMETRIES, balanced
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.registry import library
@@ -216,6 +216,25 @@ def test_the_draw_is_stable_wide_and_readable():
         assert not set(b.effects) & {*never, *family.AMBIGUOUS}
         assert b.name.startswith(b.setting.name)
         json.dumps(b.answer())
+
+
+@pytest.mark.parametrize(("what", "number"), [("pair", 2), ("triple", 3), ("unknown", 1)])
+def test_what_is_drawn_only_when_asked_for(what, number):
+    drawn = family.draw(60, [3], what)
+    assert {b.kind for b in drawn} == {what} and {len(b.effects) for b in drawn} == {number}
+    assert {b.setting.geometry for b in drawn} == set(GEOMETRIES)
+    known = catalogue.UNKNOWN if what == "unknown" else catalogue.LIBRARY
+    for b in drawn:
+        assert set(b.effects) <= set(known)
+        assert len({h.subsystems[0] for h in b.hidden}) == number
+
+
+def test_an_effect_that_the_records_hardly_show_is_not_asked_for(tmp_path):
+    setting = settings.Setting("hoist", "hum", "open", "right")
+    bench = benches.Bench("pair", ("sensor_delay", "stribeck_friction"), "mild", 8700100002, setting)
+    place = benches.write(bench, tmp_path)
+    records = read_all([place / "random.csv.gz"])
+    assert matrix.visible(bench, load_model(place / "model.yaml"), records) == ["sensor_delay"]
 
 
 def said(kind: str, **more):

@@ -75,6 +75,14 @@ def test_pairs_unknowns_and_nothing():
     both = scoring.judge(pair, said("missing", effect("entrained_air"), effect("valve_deadband", 2)))
     one = scoring.judge(pair, said("missing", effect("entrained_air")))
     assert both["both_found"] and not one["both_found"] and one["one_found"]
+    three = pair | {"kind": "triple", "hidden": pair["hidden"] | {"presliding": {}}}
+    two = said("missing", effect("entrained_air"), effect("valve_deadband", 2))
+    assert not scoring.judge(three, two)["three_found"]
+    faint = three | {"visible": ["valve_deadband", "entrained_air"]}  # what the records do not show is not asked for
+    shown = scoring.judge(faint, two)
+    beside = scoring.judge(faint, said("missing", effect("entrained_air"), effect("backlash", 2)))
+    assert shown["three_found"] and shown["only_true"] and not beside["three_found"] and not beside["only_true"]
+    assert scoring.rates([shown, beside])["three_found"] == (1, 2)
     unknown = DEADBAND | {"kind": "unknown", "hidden": {"hose_creep": {}}, "subsystems_as_good": [["fluid", "flow"]]}
     marks = scoring.judge(unknown, said(scoring.OUTSIDE, subsystem="flow"))
     assert marks["said_so"] and marks["right_subsystem"]
