@@ -68,9 +68,8 @@ class DataSheetFits(CandidateFits):
         strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
         done, moved = self.fewest_moved(final, strict if final is base else None)
         tried = self.of_one_effect(done, moved) if others else []
-        held = self.with_moved(final, ()) if found.added and tried else strict
         for keys in tried:
-            simpler = self.simpler(found, strict, held, done, moved, keys)
+            simpler = self.simpler(found, strict, done, moved, keys)
             if simpler is not None:
                 return simpler
         if not found.added:  # beside an effect, another in the place of one number is no answer that anybody asks for
@@ -92,7 +91,7 @@ class DataSheetFits(CandidateFits):
             ]
             shared = [tuple(d.key for d in moved if name in d.instead) for one in moved for name in one.instead]
             for keys in dict.fromkeys(shared):
-                simpler = None if keys in tried else self.simpler(found, strict, held, done, moved, keys)
+                simpler = None if keys in tried else self.simpler(found, strict, done, moved, keys)
                 if simpler is not None:
                     return simpler
         misfits = found.misfits
@@ -113,23 +112,22 @@ class DataSheetFits(CandidateFits):
         self,
         found: SearchResult,
         strict: SearchState,
-        held: SearchState,
         done: SearchState,
         moved: Sequence[Deviation],
         keys: Sequence[str],
     ) -> SearchResult | None:
-        """With the one effect that does what several of the numbers ``moved``, those of ``keys``, do, as BIC has it.
-
-        ``held``: with the effects found and the data sheet as it is; ``strict``: without them.
-        """
+        """With the one effect that does what several of the numbers ``moved``, those of ``keys``, do, as BIC has it."""
         taken = [d for d in moved if d.key in keys]
-        if len(taken) < 2 or not worse(held.misfit, done.misfit):
+        if len(taken) < 2:
             return None
-        without, states = self.in_place_of(held, done, taken, moved)
+        try:
+            without, states = self.in_place_of(None if found.added else strict, done, taken, moved)
+        except SimulationError:  # with these numbers back the effects that were found do not run
+            return None
         best = min(states, key=lambda s: s.misfit.total, default=done)
         if best is done:
             return None
-        name = new_effect(best, held)
+        name = new_effect(best, done)
         spared = len(taken) - sum(p.free for p in best.model.library[name].parameters)
         lost = reduction(best.misfit, done.misfit)
         if spared < 1 or lost > spared * done.misfit.freedom or not self.better(without, best):
@@ -180,14 +178,15 @@ class DataSheetFits(CandidateFits):
         return with_error(held.deviation(key, moved, state.model.value(key)), parameter_errors(state.linearisation))
 
     def in_place_of(
-        self, held: SearchState, done: SearchState, taken: Sequence[Deviation], moved: Sequence[Deviation]
+        self, strict: SearchState | None, done: SearchState, taken: Sequence[Deviation], moved: Sequence[Deviation]
     ) -> tuple[SearchState, list[SearchState]]:
         """The state with numbers ``taken`` back, and with effects that explain no less than they do.
 
-        ``held``: the state with the data sheet as it is; ``done``: with all numbers ``moved``.
+        ``done``: with all numbers ``moved``; ``strict``: with none, where that is known.
         """
         others = [d.key for d in moved if d not in taken]
-        without = self.explore(self.with_moved(done, others) if others else held, LATER_REFITS)
+        back = self.with_moved(done, others) if others or strict is None else strict
+        without = self.explore(back, LATER_REFITS)
         promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
         found, near = [], [r for r in without.refits if r.misfit.total < promising][:FULL]
         most = (1.0 + WORSE_LOOK) * self.left_on_few(done) if near else 0.0
