@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hidden_effects import benches, scoring
+from hidden_effects import benches, scoring, settings
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.diagnosis.search import diagnose
@@ -57,6 +57,15 @@ def test_the_step_of_a_coarse_sensor_is_read_off_its_readings(tmp_path):
             off[which] = np.abs(codes - np.round(codes))
         assert np.median(off["after"]) < 0.05, "evenly spread they would be 0.25 off"
         assert off["before"].max() > 0.1
+
+
+@pytest.mark.thorough
+@pytest.mark.timeout(600)
+def test_the_step_of_a_coarse_sensor_is_named_where_a_noise_model_would_do(tmp_path):
+    """Where the position alone is seen, an effect that is missing beside it hides in the noise that it passes for."""
+    setting = settings.Setting("medium", "converter", "closed", "right")
+    bench = benches.Bench("pair", ("viscous_asymmetry", "sensor_quantisation"), "mild", 8900100002, setting)
+    assert diagnosed(bench, tmp_path, 4)["verdict"]["effects"] == ["sensor_quantisation"]
 
 
 @pytest.mark.timeout(600)

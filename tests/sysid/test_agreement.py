@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
-from hydraulic_sysid.diagnosis.search.agreement import AGREED, CONFIRMED, agreed, agreement
+from hydraulic_sim.model import Model
+from hydraulic_sim.model_file import load_model
+from hydraulic_sysid.diagnosis.search.agreement import AGREED, CONFIRMED, agreed, agreement, sure
+from hydraulic_sysid.diagnosis.search.fitting import Fitting
+from hydraulic_sysid.diagnosis.search.misfit import Misfit
 
 SEGMENTS, SAMPLES = 90, 400
 FIT = np.arange(SEGMENTS) % 3 != 2
@@ -59,4 +66,21 @@ def test_what_was_not_chosen_need_not_stand_out_among_many() -> None:
     own, size = np.sum(change * (noise + change), axis=1), np.sum(change**2, axis=1)
     assert 2.0 * CONFIRMED < agreement(own[FIT], size[FIT]) < AGREED
     assert not agreed([noise + change], [noise], [FIT])
-    assert agreed([noise + change], [noise], [FIT], found=False)
+    assert sure(own, size, FIT, found=False)
+
+
+@pytest.mark.parametrize(("scatter", "believed"), [(10.0, True), (200.0, False)], ids=["steady", "by chance"])
+def test_a_step_that_the_records_show_is_judged_by_what_segments_gain(scatter: float, believed: bool) -> None:
+    """Rounding is no direction in which a share of it could be there: where it is a step off its change is large."""
+    model = load_model("sample_bench")
+
+    def state(model: Model, gains: np.ndarray) -> Any:
+        squares, counted = SAMPLES - gains, np.full(SEGMENTS, float(SAMPLES))
+        fit, rest = float(squares[FIT].sum()), float(squares[~FIT].sum())
+        values = (SAMPLES * int(FIT.sum()), SAMPLES * int((~FIT).sum()))
+        left = Misfit(fit, rest, *values, typical=1.0, by_segment=squares, counted=counted, fitted=FIT)
+        return SimpleNamespace(model=model, misfit=left, residual=[])
+
+    gains = np.random.default_rng(8).normal(20.0, scatter, SEGMENTS)
+    before, after = state(model, np.zeros(SEGMENTS)), state(model.with_effect("sensor_quantisation"), gains)
+    assert Fitting.better(cast(Any, None), before, after) is believed

@@ -18,19 +18,22 @@ AGREED = 50.0  # squared size over its variance on segments for fitting, …
 CONFIRMED = 10.0  # … and on those for validation: chance and wrong noise gave 44 and less, effects 80 and more
 
 
-def agreed(before: Sequence[Array], after: Sequence[Array], fit: Sequence[Mask], found: bool = True) -> bool:
+def agreed(before: Sequence[Array], after: Sequence[Array], fit: Sequence[Mask]) -> bool:
     """Whether segments agree that there is something of what ``after`` explains more than ``before``.
 
     :param before: residuals over noise (S, m), per record
     :param after: the same of the other model
     :param fit: (S,) which segments were fitted, per record
-    :param found: it is the best of many, fitted to them; else nothing was chosen, and chance has one try
     """
-    return sure(*_in_segments(before, after), np.concatenate(list(fit)), found)
+    return sure(*_in_segments(before, after), np.concatenate(list(fit)))
 
 
 def sure(own: Array, size: Array, fitted: Mask, found: bool = True) -> bool:
-    """The same of what `agreement` takes, of all segments; ``fitted`` (S,): which were."""
+    """The same of what `agreement` takes, of all segments.
+
+    :param fitted: (S,) which were
+    :param found: it is the best of many, fitted to them; else nothing was chosen, and chance has one try
+    """
     confirmed = fitted.all() or agreement(own[~fitted], size[~fitted]) > CONFIRMED
     return bool(agreement(own[fitted], size[fitted]) > (AGREED if found else CONFIRMED) and confirmed)
 

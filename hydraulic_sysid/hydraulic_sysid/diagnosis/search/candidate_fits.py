@@ -185,8 +185,12 @@ class CandidateFits(Fitting):
             every += self.beside_filed_values(base) if base.misfit.variance >= FAR_OFF else []
         if len(every) <= FULL and len(every) == len(near):
             return every
+        # What the records show by themselves has nothing to be fitted.
+        seen = [r for r in every if observed(base.model.library[r.name])]
         found = []
         for r in every:
+            if r in seen:
+                continue
             self.say(f"setting {r.name} against others")
             try:
                 done = self.fitted_to(self.split.some(ENOUGH), r.refit.model, self._few)
@@ -198,7 +202,7 @@ class CandidateFits(Fitting):
         for cost, r in sorted(found, key=lambda pair: pair[0]):
             best.setdefault(r.name, (cost, r))
         ranked = list(best.values())[:FULL]
-        return [r for cost, r in ranked if cost <= FAR * ranked[0][0]] or every[:FULL]
+        return [*seen, *(r for cost, r in ranked if cost <= FAR * ranked[0][0])] or every[:FULL]
 
     def beside_filed_values(self, base: SearchState) -> list[CandidateRefit]:
         """The best candidates on the model as its file has it, not refitted yet."""

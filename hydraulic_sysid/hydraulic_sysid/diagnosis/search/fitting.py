@@ -22,7 +22,7 @@ from hydraulic_sysid.estimation.parameters import Parameters, bounded
 from hydraulic_sysid.estimation.refinement import ordinary, refined
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
-from .agreement import agreed
+from .agreement import agreed, sure
 from .candidates import observed
 from .data_sheet import priors, significant
 from .errors import DiagnosisError
@@ -189,8 +189,13 @@ class Fitting:
         """
         if not material(before.misfit, after.misfit):
             return False
-        found = without_derivative(after.model) == without_derivative(before.model)
-        return not before.misfit.little or agreed(before.residual, after.residual, self.split.fit, found)
+        if not before.misfit.little:
+            return True
+        if without_derivative(after.model) == without_derivative(before.model):
+            return agreed(before.residual, after.residual, self.split.fit)
+        # What was not fitted has no size of which a share might be there: what segments gain is asked.
+        gains = before.misfit.by_segment - after.misfit.by_segment
+        return sure(gains, before.misfit.counted, before.misfit.fitted, found=False)
 
     def nearer(self, model: Model, far: bool) -> SearchState:
         """A model fitted: where it is ``far`` off, to the end only if it comes near.
