@@ -29,10 +29,11 @@ from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, Search
 from hydraulic_sysid.diagnosis.search.spectral_lines import record_features
 from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
 from hydraulic_sysid.diagnosis.search.worth import anything
-from hydraulic_sysid.estimation.fit import FitSettings
+from hydraulic_sysid.estimation.fit import Fit, FitSettings
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.recording import Reading
+from hydraulic_sysid.estimation.segments import Segments
 
 DT, SECONDS = 1e-3, 6.0
 CAPACITY = 2e-14  # m³/Pa, a twenty-fifth of what the library takes a hose for
@@ -271,3 +272,31 @@ def test_candidates_are_compared_as_they_were_fitted_to_the_end(model: Model) ->
     assert [(r.name, r.misfit.total) for r in base.refits] == [
         ("valve_underlap", 40_010.0), ("valve_deadband", 40_090.0), ("supply_droop", 45_000.0),
     ]  # fmt: skip
+
+
+class Weighed(CandidateFits):
+    """A search whose fits to a few segments are known; the step of a sensor is in none of them."""
+
+    LEFT: ClassVar = {"load_spring": 30_000.0, "constant_load": 31_000.0, "valve_null_bias": 32_000.0}
+
+    def __init__(self) -> None:
+        self.say, self._few, self.priors, self.weighed = lambda text: None, FitSettings(), {}, list[str]()
+        self.split = cast(Split, SimpleNamespace(some=lambda most: []))
+
+    def fitted_to(self, segments: Sequence[Segments], model: Model, settings: FitSettings) -> Fit:
+        self.weighed.append(model.effects[-1])
+        return cast(Fit, SimpleNamespace(values={}, point=SimpleNamespace(cost=self.LEFT[model.effects[-1]])))
+
+
+def test_the_step_of_a_sensor_is_not_set_against_others_by_fits_that_lack_it(model: Model) -> None:
+    def tried(name: str, squares: float) -> CandidateRefit:
+        return CandidateRefit(name, Refit(model.with_effect(name), []), left(squares))
+
+    step, others = tried("sensor_quantisation", 80_000.0), [tried(name, 105_000.0) for name in Weighed.LEFT]
+    at = cast(Linearisation, SimpleNamespace(parameters=SimpleNamespace(at_bound={})))
+    base = SearchState(model, at, left(108_000.0), [], [step, *others])
+    search = Weighed()
+    found = search.set_against_others(base, [step])
+    assert [r.name for r in found] == ["sensor_quantisation", "load_spring", "constant_load"]
+    assert search.weighed == ["load_spring", "constant_load", "valve_null_bias"]
+    assert [r.name for r in search.set_against_others(base, others)] == ["load_spring", "constant_load"]

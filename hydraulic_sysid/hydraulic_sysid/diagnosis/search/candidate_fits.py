@@ -186,11 +186,10 @@ class CandidateFits(Fitting):
         if len(every) <= FULL and len(every) == len(near):
             return every
         # What the records show by themselves has nothing to be fitted.
-        seen = [r for r in every if observed(base.model.library[r.name])]
+        seen = [r for r in near if observed(base.model.library[r.name])]
+        every = [r for r in every if not observed(base.model.library[r.name])]
         found = []
         for r in every:
-            if r in seen:
-                continue
             self.say(f"setting {r.name} against others")
             try:
                 done = self.fitted_to(self.split.some(ENOUGH), r.refit.model, self._few)
