@@ -12,7 +12,7 @@ import numpy as np
 
 from . import catalogue, parameters, plant
 from .geometry import balanced
-from .settings import FIRST, FIXED, OFF, Setting
+from .settings import FIRST, OFF, Setting
 
 SCATTERED = ("mass", "viscous", "bulk_modulus", "valve_flow", "leakage")
 SEVERITIES = ("mild", "strong")
@@ -69,7 +69,7 @@ class Bench:
             built["load"] *= built["mass"] / self.sheet()["mass"]  # what hangs is what moves
             off = OFF if self.setting.sheet == "off" else 0.0
             wrong = {key for h in self.hidden for key in h.relative}  # by more than that
-            for key in FIXED:
+            for key in STATED.values():
                 share = rng.uniform(-off, off)
                 built[key] *= 1.0 if key in wrong else 1.0 + share
         return built

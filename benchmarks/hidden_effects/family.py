@@ -12,12 +12,12 @@ from . import catalogue, motion, settings
 from . import sensors as instruments
 from .benches import SEVERITIES, Bench
 from .geometry import GEOMETRIES, Geometry
+from .scoring import TOGETHER
 
 WHAT = {"none": 0.3, "effect": 0.4, "datum": 0.15, "recording": 0.15,
         "pair": 0.0, "triple": 0.0, "unknown": 0.0}  # fmt: skip
 """What is hidden, and how often; what has 0 is drawn only when asked for."""
 KINDS = {what: what for what in WHAT} | {"effect": "single"}
-TOGETHER = {"pair": 2, "triple": 3}  # kind → effects of the library that are hidden together
 AMBIGUOUS = ("sensor_scale",)  # areas within their tolerance, and masses, say the same
 APART = 100_000  # between the benches' seeds of two draws
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import resource
 import tempfile
 import time
@@ -85,10 +84,12 @@ def visible(bench: benches.Bench, model: Any, records: Any) -> list[str]:
         true = true.with_entry(theirs, value=built[ours])
     for name, values in bench.truth().items():
         true = true if name == ROUNDING else true.with_effect(name, values)
-    own = [name for name in bench.effects if name != ROUNDING]
-    least = fit(true, records, true.free_keys()).cost
-    left = {name: fit(true.without_effect(name), records, true.without_effect(name).free_keys()).cost for name in own}
-    return [name for name in bench.effects if left.get(name, math.inf) > SHOWS * least]
+
+    def left(model: Any) -> float:
+        return float(fit(model, records, model.free_keys()).cost)
+
+    least = left(true)
+    return [n for n in bench.effects if n == ROUNDING or left(true.without_effect(n)) > SHOWS * least]
 
 
 def held_out_ratio(bench: benches.Bench, model: Any, after: Any, records: Any, fresh: Any) -> dict[str, float]:

@@ -11,7 +11,7 @@ from typing import Any
 
 MISSING, TIE, COMPLETE, OUTSIDE = "missing", "indistinguishable", "complete", "outside the library"
 DATA_SHEET, RECORDING = "data sheet", "recording"
-TOGETHER = ("pair", "triple")  # kinds of benches with several effects of the library
+TOGETHER = {"pair": 2, "triple": 3}  # kind of a bench → effects of the library that are hidden together
 DATUM = "datum"  # kind of a bench with a wrong data sheet
 SURE = 0.95  # probability of a verdict that is said to be sure
 NEAR = 0.10  # of the true value, from the parameter's null

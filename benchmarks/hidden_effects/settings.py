@@ -12,7 +12,6 @@ from .geometry import GEOMETRIES, Geometry
 
 SHEETS = ("right", "off")
 OFF = 0.03  # by which every number of a data sheet may be off
-FIXED = ("area", "area_b", "dead_volume", "dead_volume_b", "supply")  # whose model file gives no bounds
 
 
 @dataclass(frozen=True)

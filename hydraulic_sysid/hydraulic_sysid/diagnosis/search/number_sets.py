@@ -7,14 +7,17 @@ and without an effect that is free, too.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import chain, combinations, islice
+from collections.abc import Mapping
+from contextlib import suppress
+from itertools import combinations
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array, Mask
+from hydraulic_sim.arrays import Array
+from hydraulic_sim.effect import Effect
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.plant import Plant
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parallel import results
 
 from .candidates import RecordFeatures, candidates, observed, probes
@@ -38,14 +41,15 @@ def sets_of_one_effect(
     off = np.array([(nominal.get(k, v) - v) for k, v in own.by_key.items()]) / own.scales
     places = [own.keys.index(k) for k in nominal]
     sets = [c for size in range(2, len(places) + 1) for c in combinations(places, size)]
-    alone = {held: _cost(part.normal.information, off, held) for held in sets}
+    alone = {held: _cost(part.normal, off, held) for held in sets}
     best: dict[tuple[str, ...], float] = {}
     effects = [e for e in candidates(at.model) if not observed(e)] if sets else []
-    normals = results(lambda effect: [*islice(_bordered(part, effect.name, probes(effect, features)), 1)], effects)
-    for information in chain.from_iterable(normals):
-        beside = np.concatenate((off, np.zeros(len(information) - len(off))))
-        left = {held: _cost(information, beside, held) for held in sets}
-        simpler = [h for h in sets if len(h) > len(information) - len(off) and left[h] < ROUGH * alone[h]]
+    for normal in results(lambda effect: _beside(part, effect, features), effects):
+        if normal is None:
+            continue
+        brought = len(normal.information) - len(off)
+        left = {held: _cost(normal, np.concatenate((off, np.zeros(brought))), held) for held in sets}
+        simpler = [h for h in sets if len(h) > brought and left[h] < ROUGH * alone[h]]
         likely = {h: left[h] / share - len(h) * freedom for h in simpler}
         if likely:
             chosen = min(likely, key=lambda held: likely[held])
@@ -54,19 +58,17 @@ def sets_of_one_effect(
     return sorted(best, key=lambda keys: best[keys])
 
 
-def _bordered(at: Linearisation, name: str, groups: Iterator) -> Iterator[Array]:
-    """The normal equations' matrix with what an effect brings, at the probes of its first shape that run."""
-    model = at.model.with_effect(name)
-    for group in groups:
-        try:
-            yield at.bordered(at.changes([Plant.for_fits(model.with_values(p.values)) for p in group])).information
-        except SimulationError:
-            continue
+def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> NormalEquations | None:
+    """The normal equations with what an effect brings, at the probes of its first shape that run; None: none do."""
+    model = at.model.with_effect(effect.name)
+    for group in probes(effect, features):
+        with suppress(SimulationError):
+            return at.bordered(at.changes([Plant.for_fits(model.with_values(p.values)) for p in group]))
+    return None
 
 
-def _cost(information: Array, off: Array, held: tuple[int, ...]) -> float:
+def _cost(normal: NormalEquations, off: Array, held: tuple[int, ...]) -> float:
     """Sum of squares that it costs to move the parameters ``held`` by ``off`` (P,), the others free to follow."""
-    fixed: Mask = np.isin(np.arange(len(off)), held)
-    own, cross = information[np.ix_(fixed, fixed)], information[np.ix_(~fixed, fixed)]
-    followed = np.linalg.lstsq(information[np.ix_(~fixed, ~fixed)], cross @ off[fixed], rcond=1e-12)[0]
-    return max(float(off[fixed] @ (own @ off[fixed] - cross.T @ followed)), 0.0)
+    others = np.setdiff1d(np.arange(len(off)), held)
+    moved = normal.subset(np.concatenate((others, held))).marginal(len(others))
+    return max(float(off[list(held)] @ moved.information @ off[list(held)]), 0.0)
