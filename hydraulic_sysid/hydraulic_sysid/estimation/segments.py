@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -85,6 +85,8 @@ class Segments:
     disturbance: Array
     loudness: Array
     """(S, C) by how many times the noise of a channel is stronger in a segment than in all."""
+    run_ups: dict[tuple[bytes, tuple[str, ...]], int | None] = field(default_factory=dict, repr=False, compare=False)
+    """Samples of run-up that `Shooting` found, by ``first`` and effects; shared with all that is made from these."""
 
     def __len__(self) -> int:
         return len(self.first)

@@ -81,10 +81,6 @@ class Shooting:
         return {}
 
     @cached_property
-    def _run_ups(self) -> dict[tuple[int, tuple[str, ...]], int | None]:
-        return {}
-
-    @cached_property
     def initial_states(self) -> list[Array]:
         """As the records show them."""
         return [s.initial_states(self.plant) for s in self.segments]
@@ -272,12 +268,13 @@ class Shooting:
     def _run_up(self, plant: Plant, i: int, path: tuple[float | str, ...], columns: list[int]) -> int | None:
         """Samples before each segment from which on such a plant is propagated; None: from the beginning.
 
-        It is what `_shortest_run_up` finds for the first plant with the same effects.
+        It is what `_shortest_run_up` finds for the first plant with the same effects, whichever fit that was of.
         """
-        key = i, tuple(part for part in path if isinstance(part, str))
-        if key not in self._run_ups:
-            self._run_ups[key] = self._shortest_run_up(plant, i, columns)
-        return self._run_ups[key]
+        segments = self.segments[i]
+        key = segments.first.tobytes(), tuple(part for part in path if isinstance(part, str))
+        if key not in segments.run_ups:
+            segments.run_ups[key] = self._shortest_run_up(plant, i, columns)
+        return segments.run_ups[key]
 
     def _shortest_run_up(self, plant: Plant, i: int, columns: list[int]) -> int | None:
         """Samples after which a plant has forgotten what it began with; None where that takes most of the record.
