@@ -300,18 +300,29 @@ def test_an_unknown_drive_is_blamed_for_what_it_explains(model, before: float, a
     assert verdict.kind_of(found, tied=False) == kind
 
 
-@pytest.mark.parametrize(("share", "begins"), [(0.05, "Missing: "), (0.3, "Outside the library: coulomb_friction")])
-def test_beside_an_effect_that_is_missing_a_small_change_is_a_detail(model, share: float, begins: str) -> None:
-    base, final = state(model, 12000.0, {}), state(model.with_effect("constant_load"), 3000.0, {})
+@pytest.mark.parametrize(
+    ("share", "left", "explained", "begins"),
+    [
+        (0.05, 3000.0, 60.0, "Missing: "),
+        (0.3, 3000.0, 60.0, "Outside the library: coulomb_friction"),
+        (0.3, 6000.0, 1000.0, "Outside the library: coulomb_friction"),
+        (0.3, 6000.0, 500.0, "Outside the library: no effect of it explains what is left"),
+    ],
+    ids=["small", "all that is left", "a third of what is left", "little of what is left"],
+)
+def test_beside_an_effect_a_change_that_is_small_or_explains_little_is_a_detail(
+    model, share: float, left: float, explained: float, begins: str
+) -> None:
+    base, final = state(model, 12000.0, {}), state(model.with_effect("constant_load"), left, {})
     found = SearchResult(
         model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {},
-        drift=Drift("coulomb_friction.level", 450.0, 450.0 * share, 2.0, share),
+        drift=Drift("coulomb_friction.level", 450.0, 450.0 * share, 2.0, share, explained),
     )  # fmt: skip
     judged = verdict.judge(found)
     said = verdict.sentences(found, judged, [])
     assert said.startswith(begins)
     assert said.count("coulomb_friction.level changes along the records") == 1
-    assert verdict.place(found, judged, []) == "force"
+    assert verdict.place(found, judged, []) == (None if explained == 500.0 else "force")
 
 
 @pytest.mark.parametrize(

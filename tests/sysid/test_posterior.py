@@ -127,7 +127,7 @@ def test_outside_the_library_is_that_none_of_these_is_right(model: Model) -> Non
     assert sentence(found) == "The probability of this verdict is over 99 %."
     little = result(model, 1.2, 1.0)
     assert probability(explanations(little, verdict(OUTSIDE, "constant_load"))) == 0.5, "a law bent to its limits"
-    drifting = replace(little, drift=Drift("viscous_friction.coefficient", 300.0, 100.0, 5.0, 0.3))
+    drifting = replace(little, drift=Drift("viscous_friction.coefficient", 300.0, 100.0, 5.0, 0.3, 60.0))
     assert cast(float, probability(explanations(drifting, verdict(OUTSIDE)))) == pytest.approx(ODDS / (1.0 + ODDS))
 
 

@@ -26,6 +26,7 @@ from .remainder import NOTHING, Remainder, Spikes, immaterial
 from .search_state import SearchResult
 from .set_aside import DIFFERENT, FAR_OFF, SATURATED, SetAside
 from .whiteness import Whiteness
+from .worth import FURTHER
 
 MISSING = "missing"
 INDISTINGUISHABLE = "indistinguishable"
@@ -173,12 +174,13 @@ def faulty(result: SearchResult) -> bool:
 def decisive_drift(result: SearchResult) -> Drift | None:
     """The change along the records, if it is what no effect explains.
 
-    Beside effects that are missing a change that a law may be off anyway is a detail.
+    Beside effects that are missing a change that a law may be off anyway is a detail, and where much is left one that
+    explains little of it is, too.
     """
-    found = result.drift
+    found, final = result.drift, result.final.misfit
     if found is None or drive_unknown(result) or (result.added and abs(found.share) < LEAST):
         return None
-    return found
+    return found if final.little or found.explained >= FURTHER * final.excess else None
 
 
 def drifting_effect(result: SearchResult) -> str | None:
