@@ -188,11 +188,11 @@ class CandidateFits(Fitting):
         # What the records show by themselves has nothing to be fitted.
         seen = [r for r in near if observed(base.model.library[r.name])]
         every = [r for r in every if not observed(base.model.library[r.name])]
-        found = []
+        found, few = [], self.split.some(ENOUGH)
         for r in every:
             self.say(f"setting {r.name} against others")
             try:
-                done = self.fitted_to(self.split.some(ENOUGH), r.refit.model, self._few)
+                done = self.fitted_to(few, r.refit.model, self._few)
             except SimulationError:
                 continue
             fitted = replace(r.refit, model=r.refit.model.with_values(done.values))
@@ -201,7 +201,10 @@ class CandidateFits(Fitting):
         for cost, r in sorted(found, key=lambda pair: pair[0]):
             best.setdefault(r.name, (cost, r))
         ranked = list(best.values())[:FULL]
-        return [*seen, *(r for cost, r in ranked if cost <= FAR * ranked[0][0])] or every[:FULL]
+        noise = sum(int(s.counted.sum()) for s in few)
+        excess = [max(cost - noise, 0.0) for cost, _ in ranked]
+        near = [r for own, (_, r) in zip(excess, ranked, strict=True) if own <= FAR * excess[0] + base.misfit.least]
+        return [*seen, *near] or every[:FULL]
 
     def beside_filed_values(self, base: SearchState) -> list[CandidateRefit]:
         """The best candidates on the model as its file has it, not refitted yet."""

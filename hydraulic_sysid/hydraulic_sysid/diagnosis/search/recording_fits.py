@@ -9,7 +9,7 @@ from functools import partial
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 
-from .candidate_fits import FULL, NEAR
+from .candidate_fits import FULL, NEAR, PROMISED
 from .data_sheet import relaxed, restored
 from .data_sheet_fits import DataSheetFits
 from .drive_faults import costs_with
@@ -85,7 +85,7 @@ class RecordingFits(DataSheetFits):
             near = faults[:1]
         if not near:
             return None
-        found = self.plainest(base, [self.with_fault(base, f) for f in near])
+        found = self.plainest(base, [self.with_fault(base, f, PROMISED * least) for f in near])
         worth = material(base.misfit, found.misfit) and explained(base.misfit, found.misfit) >= FURTHER
         return found if worth else None
 
@@ -131,18 +131,24 @@ class RecordingFits(DataSheetFits):
         """Whether a fault is why a model leaves nothing only with small delays of all channels, or at bounds."""
         return fault.unusual(self.split.interval) and fault.reduction > PROMISES * base.misfit.least
 
-    def with_fault(self, base: SearchState, fault: RecordingFault) -> FaultFit:
-        """A state fitted to records that are taken to have a fault, again while the fault's best size changes."""
+    def with_fault(self, base: SearchState, fault: RecordingFault, least: float = 0.0) -> FaultFit:
+        """A state fitted to records that are taken to have a fault, again while the fault's best size changes.
+
+        :param least: reduction of the sum of squares that the first fit must show to be gone on with
+        """
         self.say(f"fitting with: {fault.text}")
         before, tried = self.split, list[tuple[RecordingFault, SearchState, Split]]()
         try:
             for sized in fault.starts(before.interval):
                 self.split = replace(before, segments=sized.applied(base.linearisation))
-                tried.append((sized, self.begun_anew(self.state(base.model, self._last)), self.split))
-                if tried[-1][1].misfit.variance - 1.0 < NOTHING_LEFT:
+                state = self.state(base.model, self._last)
+                if base.misfit.fit - state.misfit.fit >= least:
+                    state = self.begun_anew(state)
+                tried.append((sized, state, self.split))
+                if state.misfit.variance - 1.0 < NOTHING_LEFT:
                     break
             fault, state, self.split = min(tried, key=lambda one: one[1].misfit.total)
-            for _ in range(MOST_SIZES):
+            for _ in range(MOST_SIZES if base.misfit.fit - state.misfit.fit >= least else 0):
                 new, error = resized(state.linearisation, fault), SAME_SIZE * abs(fault.size)
                 if new is fault or abs(new.size - fault.size) < max(error, 2.0 * new.standard_error):
                     break
