@@ -57,6 +57,7 @@ def test_names_are_unique_and_counts_suffice():
     assert kinds.count("datum") == 2 * len(catalogue.DATUM) and kinds.count("recording") == 2 * len(catalogue.RECORDING)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", sorted(set(catalogue.LIBRARY | catalogue.UNKNOWN | catalogue.DATUM) - LEFT_OUT))
 def test_what_is_mild_moves_a_channel_by_several_times_the_noise(name):
     kind = next(kind for kind, names in catalogue.KINDS.items() if name in names)

@@ -140,7 +140,11 @@ def test_wrong_numbers_beside_a_missing_effect_are_named_as_such(model: Model) -
 
 
 @pytest.mark.parametrize(
-    ("effect", "size", "others"), [("hose_compliance", 0.4, {}), ("sensor_offset", 0.4, {"constant_load": 300.0})]
+    ("effect", "size", "others"),
+    [
+        ("hose_compliance", 0.4, {}),
+        pytest.param("sensor_offset", 0.4, {"constant_load": 300.0}, marks=pytest.mark.thorough),
+    ],
 )
 def test_one_effect_is_simpler_than_two_numbers_that_say_the_same(
     model: Model, effect: str, size: float, others: Mapping[str, float]
@@ -174,6 +178,7 @@ def test_one_effect_is_simpler_beside_numbers_that_are_wrong(model: Model, effec
     assert {d["key"] for d in found["data_sheet_instead"]} <= {"dead_volume_a", "dead_volume_b"}
 
 
+@pytest.mark.thorough
 def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> None:
     late = [{c: np.concatenate((v[:1], v[:1], v[:-2])) if c.startswith("pressure") else v for c, v in run.items()}
             for run in runs]  # fmt: skip
@@ -184,7 +189,6 @@ def test_late_pressures_are_a_matter_of_the_recording(model: Model, runs) -> Non
     assert fault["size"] == pytest.approx(2.0 * DT, rel=0.1)
     assert "late" in found["verdict"]["text"]
     assert found["residual"]["before"]["validation"] > 1.2 * found["residual"]["after"]["validation"]
-    assert_cannot_inject(found)
 
 
 @pytest.mark.thorough
@@ -260,6 +264,7 @@ def test_a_transducer_that_reads_too_much_is_a_matter_of_the_recording(model: Mo
     assert fault["name"] == "pressure_b_gain" and fault["unit"] == "1"
     assert fault["size"] == pytest.approx(0.03, rel=0.1)
     assert "pressure_b reads 3.0 % too much: calibrate the transducer" in found["verdict"]["text"]
+    assert_cannot_inject(found)
 
 
 def test_spikes_are_counted_and_do_not_count(model: Model, runs) -> None:

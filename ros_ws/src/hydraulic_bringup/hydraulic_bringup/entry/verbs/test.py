@@ -26,7 +26,12 @@ from ..bench import Bench
 
 ORDER = 2
 CHECKS = ("ruff", "check", "."), ("mypy",)
-COMPILE = "from hydraulic_sim import model_file, plant; plant.Plant(model_file.load_model('sample_bench'))"
+COMPILE = """
+import pytest
+from hydraulic_sim import model_file, plant
+plant.Plant(model_file.load_model("sample_bench"))
+pytest.main(["--collect-only", "-qqq", "tests"])
+"""
 FAILED_TESTS = 1  # pytest's exit code; others mean that it was not able to run them
 THOROUGH = "--thorough"
 LONGEST_S = 2400.0  # of a run on two processors, with a margin; what hangs beyond it is interrupted and has failed
@@ -50,7 +55,7 @@ def run(bench: Bench, arguments: list[str]) -> int:
     variables.pop("PYTHONDONTWRITEBYTECODE", None)  # each of hundreds of processes would compile all that it imports
     failed = []
     # Once, and beside the checks: else each of the workers would begin with it. The tests say what is wrong with it.
-    with subprocess.Popen([python[0], "-c", COMPILE], cwd=root, env=variables):
+    with subprocess.Popen([python[0], "-c", COMPILE], cwd=root, env=variables, stdout=subprocess.DEVNULL):
         for name, *options in CHECKS:
             print(f"== {name}", flush=True)
             if subprocess.call([*python, name, *options], cwd=root, env=variables):
