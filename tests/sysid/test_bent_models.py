@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import ClassVar, cast
 
@@ -14,6 +14,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.search import recording_fits
 from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
 from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, Deviation, priors
@@ -24,6 +25,8 @@ from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit, refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
+from hydraulic_sysid.diagnosis.search.recording_faults import RecordingFault
+from hydraulic_sysid.diagnosis.search.recording_fits import RecordingFits
 from hydraulic_sysid.diagnosis.search.score_test import score
 from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
 from hydraulic_sysid.diagnosis.search.spectral_lines import record_features
@@ -279,13 +282,72 @@ class Weighed(CandidateFits):
 
     LEFT: ClassVar = {"load_spring": 30_000.0, "constant_load": 31_000.0, "valve_null_bias": 32_000.0}
 
-    def __init__(self) -> None:
+    def __init__(self, counted: int = 0, left: Mapping[str, float] = LEFT) -> None:
         self.say, self._few, self.priors, self.weighed = lambda text: None, FitSettings(), {}, list[str]()
-        self.split = cast(Split, SimpleNamespace(some=lambda most: []))
+        few = [SimpleNamespace(counted=np.array([counted]))]
+        self.split, self.left = cast(Split, SimpleNamespace(some=lambda most: few)), left
 
     def fitted_to(self, segments: Sequence[Segments], model: Model, settings: FitSettings) -> Fit:
         self.weighed.append(model.effects[-1])
-        return cast(Fit, SimpleNamespace(values={}, point=SimpleNamespace(cost=self.LEFT[model.effects[-1]])))
+        return cast(Fit, SimpleNamespace(values={}, point=SimpleNamespace(cost=self.left[model.effects[-1]])))
+
+
+@pytest.mark.parametrize(("second", "goes_on"), [(31_400.0, True), (32_600.0, False)])
+def test_what_leaves_far_more_of_the_same_segments_is_not_fitted_to_the_end(
+    model: Model, second: float, goes_on: bool
+) -> None:
+    """More than five times what the best leaves beyond the noise, which is 29 500 of both."""
+    costs = {"load_spring": 30_000.0, "constant_load": second, "valve_null_bias": 40_000.0}
+    tried = [CandidateRefit(name, Refit(model.with_effect(name), []), left(50_000.0)) for name in costs]
+    at = cast(Linearisation, SimpleNamespace(parameters=SimpleNamespace(at_bound={})))
+    base = SearchState(model, at, left(108_000.0), [], tried)
+    found = Weighed(29_500, costs).set_against_others(base, tried)
+    assert [r.name for r in found] == ["load_spring", *(["constant_load"] if goes_on else [])]
+
+
+@dataclass
+class Uncut:
+    """Segments of which nothing is asked but their sampling."""
+
+    segments: Sequence[Segments]
+    interval: float = 1e-3
+
+
+class Faulty(RecordingFits):
+    """A search whose fits with a fault leave what is given."""
+
+    def __init__(self, squares: float) -> None:
+        self.say, self._last, self.split = lambda text: None, FitSettings(), cast(Split, Uncut([]))
+        self.squares, self.begun = squares, 0
+
+    def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
+        return SearchState(model, cast(Linearisation, None), left(self.squares), [])
+
+    def begun_anew(self, state: SearchState) -> SearchState:
+        self.begun += 1
+        return state
+
+
+@pytest.mark.parametrize(("least", "goes_on"), [(10_000.0, True), (30_000.0, False)])
+def test_a_fault_that_explains_little_at_first_is_not_gone_on_with(
+    model: Model, least: float, goes_on: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sized = list[RecordingFault]()
+    fault = cast(RecordingFault, SimpleNamespace(
+        text="late", size=2e-3, starts=lambda interval: [fault], applied=lambda at: [],
+    ))  # fmt: skip
+
+    def resized(at: Linearisation, now: RecordingFault) -> RecordingFault:
+        sized.append(now)
+        return now
+
+    monkeypatch.setattr(recording_fits, "resized", resized)
+    monkeypatch.setattr(recording_fits, "costs_with", lambda *_: [])
+    monkeypatch.setattr(recording_fits, "misfit", lambda *_: left(90_000.0))
+    search = Faulty(90_000.0)
+    found = search.with_fault(SearchState(model, cast(Linearisation, None), left(108_000.0), []), fault, least)
+    assert found.misfit.total == 90_000.0
+    assert (search.begun, len(sized)) == ((1, 1) if goes_on else (0, 0))
 
 
 def test_the_step_of_a_sensor_is_not_set_against_others_by_fits_that_lack_it(model: Model) -> None:

@@ -259,6 +259,13 @@ def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
     states = shooting.initial_states
     short = shooting.simulated(plant, states)[0]
     assert (run_ups[-1] is not None) == forgets
+    tried = len(run_ups)
+    Shooting(plant, [apart]).simulated(plant, states)
+    assert len(run_ups) == tried + 1, "another fit to the same segments knows it"
+    part = Shooting(plant, [apart.subset(np.array([False, True]))])
+    part.simulated(plant, part.initial_states)
+    assert len(run_ups) > tried + 2, "of other segments it is another"
     monkeypatch.setattr(Shooting, "_shortest_run_up", lambda *_: None)
-    whole = Shooting(plant, [apart]).simulated(plant, states)[0]
+    whole = Shooting(plant, [replace(apart, run_ups={})]).simulated(plant, states)[0]
+    assert run_ups[-1] is None
     assert np.all(np.abs(short - whole) <= 1e-3 * np.ptp(whole, axis=(0, 1)))
