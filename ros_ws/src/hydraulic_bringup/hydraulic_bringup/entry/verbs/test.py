@@ -26,12 +26,10 @@ from ..bench import Bench
 
 ORDER = 2
 CHECKS = ("ruff", "check", "."), ("mypy",)
-COMPILE = """
-import pytest
-from hydraulic_sim import model_file, plant
-plant.Plant(model_file.load_model("sample_bench"))
-pytest.main(["--collect-only", "-qqq", "tests"])
-"""
+COMPILE = (
+    "from hydraulic_sim import model_file, plant; plant.Plant(model_file.load_model('sample_bench')); "
+    "import pytest; pytest.main(['--collect-only', '-qqq', 'tests'])"
+)
 FAILED_TESTS = 1  # pytest's exit code; others mean that it was not able to run them
 THOROUGH = "--thorough"
 LONGEST_S = 2400.0  # of a run on two processors, with a margin; what hangs beyond it is interrupted and has failed
