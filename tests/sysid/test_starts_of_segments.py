@@ -233,6 +233,14 @@ def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(
         shooting.try_out(stiff, shooting.initial_states)
 
 
+SLOWER = {
+    "spool_dynamics": ["spool_dynamics.damping"],
+    "supply_droop": ["supply_droop.time"],
+    "structural_flexibility": ["structural_flexibility.mass"],
+    "valve_hysteresis": ["valve_hysteresis.half_width"],
+}
+
+
 @pytest.mark.parametrize(
     ("effect", "forgets"),
     [("spool_dynamics", True), ("supply_droop", True), ("structural_flexibility", True), ("valve_hysteresis", False)],
@@ -264,7 +272,11 @@ def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
     assert len(run_ups) == tried + 1, "another fit to the same segments knows it"
     part = Shooting(plant, [apart.subset(np.array([False, True]))])
     part.simulated(plant, part.initial_states)
-    assert len(run_ups) > tried + 2, "of other segments it is another"
+    again = len(run_ups)
+    assert again > tried + 2, "of other segments it is another"
+    slower = plant.with_parameters({k: 2.0 * plant.value(k) for k in SLOWER[effect]})
+    Shooting(slower, [apart]).simulated(slower, states)
+    assert len(run_ups) > again + 1, "and so it is of another memory"
     monkeypatch.setattr(Shooting, "_shortest_run_up", lambda *_: None)
     whole = Shooting(plant, [replace(apart, run_ups={})]).simulated(plant, states)[0]
     assert run_ups[-1] is None

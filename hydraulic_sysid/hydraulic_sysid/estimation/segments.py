@@ -85,8 +85,8 @@ class Segments:
     disturbance: Array
     loudness: Array
     """(S, C) by how many times the noise of a channel is stronger in a segment than in all."""
-    run_ups: dict[tuple[bytes, tuple[str, ...]], int | None] = field(default_factory=dict, repr=False, compare=False)
-    """Samples of run-up that `Shooting` found, by ``first`` and effects; shared with all that is made from these."""
+    run_ups: dict[tuple[bytes, tuple[object, ...]], int | None] = field(default_factory=dict, repr=False, compare=False)
+    """Samples of run-up that `Shooting` found, by ``first`` and plant; shared with all that is made from these."""
 
     def __len__(self) -> int:
         return len(self.first)

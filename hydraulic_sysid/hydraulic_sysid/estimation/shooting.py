@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -268,10 +269,10 @@ class Shooting:
     def _run_up(self, plant: Plant, i: int, path: tuple[float | str, ...], columns: list[int]) -> int | None:
         """Samples before each segment from which on such a plant is propagated; None: from the beginning.
 
-        It is what `_shortest_run_up` finds for the first plant with the same effects, whichever fit that was of.
+        It is what `_shortest_run_up` finds for the first plant with about the same values, whichever fit that was of.
         """
         segments = self.segments[i]
-        key = segments.first.tobytes(), tuple(part for part in path if isinstance(part, str))
+        key = segments.first.tobytes(), tuple(map(_about, path))
         if key not in segments.run_ups:
             segments.run_ups[key] = self._shortest_run_up(plant, i, columns)
         return segments.run_ups[key]
@@ -332,6 +333,13 @@ class Shooting:
             moved[:, index] += step
             jacobian[..., place] = (self._residual(plant, i, moved, inner) - base) / step
         return Projection.of(base, jacobian, *segments.all_nuisance)
+
+
+def _about(part: float | str) -> str | tuple[bool, float]:
+    """The sign and the nearest half octave of a value: of plants further apart one may remember longer."""
+    if isinstance(part, str):
+        return part
+    return part > 0.0, round(2.0 * math.log2(abs(part))) if part else -math.inf
 
 
 def better_of(
