@@ -233,20 +233,17 @@ def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(
         shooting.try_out(stiff, shooting.initial_states)
 
 
-SLOWER = {
-    "spool_dynamics": ["spool_dynamics.damping"],
-    "supply_droop": ["supply_droop.time"],
-    "structural_flexibility": ["structural_flexibility.mass"],
-    "valve_hysteresis": ["valve_hysteresis.half_width"],
-}
-
-
 @pytest.mark.parametrize(
-    ("effect", "forgets"),
-    [("spool_dynamics", True), ("supply_droop", True), ("structural_flexibility", True), ("valve_hysteresis", False)],
+    ("effect", "memory", "forgets"),
+    [
+        ("spool_dynamics", "damping", True),
+        ("supply_droop", "time", True),
+        ("structural_flexibility", "mass", True),
+        ("valve_hysteresis", "half_width", False),
+    ],
 )
 def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
-    model: Model, effect: str, forgets: bool, monkeypatch: pytest.MonkeyPatch
+    model: Model, effect: str, memory: str, forgets: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two segments far apart, each long after a burst that leaves the valve's play on the other side."""
     plant = Plant.for_fits(model.with_effect(effect, {} if forgets else {"half_width": 0.2}))
@@ -274,7 +271,7 @@ def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
     part.simulated(plant, part.initial_states)
     again = len(run_ups)
     assert again > tried + 2, "of other segments it is another"
-    slower = plant.with_parameters({k: 2.0 * plant.value(k) for k in SLOWER[effect]})
+    slower = plant.with_parameters({f"{effect}.{memory}": 2.0 * plant.value(f"{effect}.{memory}")})
     Shooting(slower, [apart]).simulated(slower, states)
     assert len(run_ups) > again + 1, "and so it is of another memory"
     monkeypatch.setattr(Shooting, "_shortest_run_up", lambda *_: None)
