@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,8 +106,9 @@ class Plant:
 
     @property
     def path(self) -> tuple[float | str, ...]:
-        """All that a plant's motion follows from besides the drive: effects and values."""
-        return (*(e.name for e in self._active), *self._parameters.tolist())
+        """All that a plant's motion follows from besides the drive: effects and values, without those of sensors."""
+        acting = [e for e in self._active if SLOTS[e.slot].subsystem != "sensor"]
+        return self._values_of(acting, [k for k in self.layout.parameters if "." not in k])
 
     @property
     def held_path(self) -> tuple[float | str, ...]:
@@ -116,9 +117,16 @@ class Plant:
         Forces move nothing there, and what sensors read comes after.
         """
         acting = [e for e in self._active if SLOTS[e.slot].subsystem not in ("force", "sensor")]
-        keys = [k for k in self.layout.parameters if "." not in k and k not in _OF_FORCES]
-        keys += [f"{e.name}.{p.name}" for e in acting for p in e.parameters]
-        return (*(e.name for e in acting), *(self.value(k) for k in keys))
+        return self._values_of(acting, [k for k in self.layout.parameters if "." not in k and k not in _OF_FORCES])
+
+    @property
+    def inner_path(self) -> tuple[float | str, ...]:
+        """What the memory of inner states hangs on beside what is seen and the drive: their effects and the values."""
+        return self._values_of(self._inner_effects, ["drive_limit"])
+
+    def _values_of(self, effects: Sequence[Effect], base_keys: Sequence[str]) -> tuple[float | str, ...]:
+        keys = [*base_keys, *(f"{e.name}.{p.name}" for e in effects for p in e.parameters)]
+        return (*(e.name for e in effects), *(self.value(k) for k in keys))
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -372,8 +380,7 @@ class Plant:
             taken = arguments(e.dynamics) if e.dynamics else arguments(e.kernel)
             if not alone.issuperset(set(taken) - own):
                 return None
-        keys = ["drive_limit", *(f"{e.name}.{p.name}" for e in inner for p in e.parameters)]
-        return (*(e.name for e in inner), *(self.value(k) for k in keys))
+        return self.inner_path
 
     def track(
         self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike, run_up: int | None = None

@@ -12,10 +12,11 @@ from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
-from hydraulic_sim.plant import Plant
+from hydraulic_sim.plant import LONGEST_MEMORY, Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.known_starts import KnownStarts
+from hydraulic_sysid.estimation.run_ups import RunUps
 from hydraulic_sysid.estimation.segments import STICK_SPEED, Segments, cut
 from hydraulic_sysid.estimation.shooting import Shooting
 
@@ -265,16 +266,37 @@ def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
     short = shooting.simulated(plant, states)[0]
     assert (run_ups[-1] is not None) == forgets
     tried = len(run_ups)
-    Shooting(plant, [apart]).simulated(plant, states)
-    assert len(run_ups) == tried + 1, "another fit to the same segments knows it"
-    part = Shooting(plant, [apart.subset(np.array([False, True]))])
-    part.simulated(plant, part.initial_states)
-    again = len(run_ups)
-    assert again > tried + 2, "of other segments it is another"
-    slower = plant.with_parameters({f"{effect}.{memory}": 2.0 * plant.value(f"{effect}.{memory}")})
+    for known in (apart, apart.subset(np.array([False, True]))):
+        other = Shooting(plant, [known])
+        other.simulated(plant, other.initial_states)
+    assert len(run_ups) == tried + 2, "another fit knows it, and one to some of the segments"
+    slower = plant.with_parameters({f"{effect}.{memory}": 8.0 * plant.value(f"{effect}.{memory}")})
     Shooting(slower, [apart]).simulated(slower, states)
-    assert len(run_ups) > again + 1, "and so it is of another memory"
-    monkeypatch.setattr(Shooting, "_shortest_run_up", lambda *_: None)
-    whole = Shooting(plant, [replace(apart, run_ups={})]).simulated(plant, states)[0]
+    assert len(run_ups) > tried + 3, "of another memory it is another"
+    whole = Shooting(plant, [replace(apart, run_ups=Never())]).simulated(plant, states)[0]
     assert run_ups[-1] is None
     assert np.all(np.abs(short - whole) <= 1e-3 * np.ptp(whole, axis=(0, 1)))
+
+
+class Never(RunUps):
+    """Of a record on which nothing is ever forgotten."""
+
+    def find(self, *_: Any) -> None:
+        return None
+
+
+def test_a_run_up_is_of_plants_with_the_same_laws_and_values_like_these() -> None:
+    sought = []
+
+    def seek(least: int) -> int | None:
+        sought.append(least)
+        return 4 * LONGEST_MEMORY if len(sought) == 1 else None
+
+    known = RunUps()
+    found = [known.find(path, seek) for path in (("a", 1.0, 0.0), ("a", 3.0, 0.0), ("a", 0.3, 0.0))]
+    assert found == [4 * LONGEST_MEMORY] * 3 and sought == [LONGEST_MEMORY]
+    for path in (("a", 5.0, 0.0), ("a", -1.0, 0.0), ("a", 1.0, 1e-9)):
+        assert known.find(path, seek) is None
+    assert sought[1:] == [4 * LONGEST_MEMORY] * 3, "what is shorter than it did for none of these laws"
+    known.find(("b", 1.0, 0.0), seek)
+    assert sought[-1] == LONGEST_MEMORY

@@ -26,6 +26,7 @@ from .noise import noise_std, robust_noise_std, spikes, without
 from .noise_model import ChannelNoise
 from .projection import Explained, project_out
 from .recording import Reading
+from .run_ups import RunUps
 from .saturation import runs
 from .velocity_filter import VelocityFilter
 from .whitened_residual import residual
@@ -85,8 +86,8 @@ class Segments:
     disturbance: Array
     loudness: Array
     """(S, C) by how many times the noise of a channel is stronger in a segment than in all."""
-    run_ups: dict[tuple[bytes, tuple[object, ...]], int | None] = field(default_factory=dict, repr=False, compare=False)
-    """Samples of run-up that `Shooting` found, by ``first`` and plant; shared with all that is made from these."""
+    run_ups: RunUps = field(default_factory=RunUps, repr=False, compare=False)
+    """Of the record; shared with all that is made from these segments."""
 
     def __len__(self) -> int:
         return len(self.first)

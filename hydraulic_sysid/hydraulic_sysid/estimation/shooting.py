@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
 
-from hydraulic_sim.arrays import Array, Mask
+from hydraulic_sim.arrays import Array, Index, Mask
 from hydraulic_sim.errors import SimulationError
-from hydraulic_sim.plant import LONGEST_MEMORY, Plant
+from hydraulic_sim.plant import Plant
 
 from .parallel import results
 from .parameters import Parameters
 from .projection import Projection
+from .run_ups import sufficient
 from .segments import Segments
 
 T = TypeVar("T")
 
-_SAME = 1e-3  # of the range of a state: off by less after a run-up, it is as from the beginning
-_NUDGE = 1e-6  # of the mass; where it changes a state by …
-_AMPLIFIED = 1e-4  # … that much of its range, no propagation says where the state is (a load that rattles in a gap)
+_NUDGE = 1e-6  # of the mass: no propagation knows it any better
 _WORTH = 0.7  # of a record, beyond which run-ups to its segments save nothing
 _MOST_KNOWN = 256  # propagations along a record that are kept
 _STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
@@ -240,72 +238,45 @@ class Shooting:
             columns = [k for k, name in enumerate(plant.state_names) if k >= measured and name != "stick"]
             path = plant.drive_path
             tracked = plant if path is None else plant.driven()
-            found = Inner(columns, *self._track(tracked, i, path or plant.path, columns))
+            found = Inner(columns, *self._track(tracked, i, path or plant.path, plant.inner_path, columns))
         if segments.tracked:
             # The piston moves as it was seen to, whatever its forces.
-            values, _ = self._track(plant.held(), i, ("held", *plant.held_path), segments.tracked)
+            path = ("held", *plant.held_path)
+            values, _ = self._track(plant.held(), i, path, path, segments.tracked)
             found = replace(found, pressures=(segments.tracked, values))
         return found
 
     def _track(
-        self, plant: Plant, i: int, path: tuple[float | str, ...], columns: list[int]
+        self, plant: Plant, i: int, path: tuple[float | str, ...], hangs_on: tuple[float | str, ...], columns: list[int]
     ) -> tuple[Array, Array]:
         """States and memories at each segment; those of another plant of the same ``path``, where there was one.
 
-        Only these ``columns`` of the states are of use.
+        Only these ``columns`` of the states are of use; their memory ``hangs_on`` these effects and values.
         """
         known = self._known.get((i, path))
         if known is None:
             if len(self._known) > _MOST_KNOWN:
                 self._known.clear()
-            known = self._propagated(plant, i, self._run_up(plant, i, path, columns))
+            segments, run_up = self.segments[i], self._run_up(plant, i, hangs_on, columns)
+            known = plant.track(segments.drive, segments.record.dt, segments.first, segments.smoothed, run_up)
             self._known[i, path] = known
         return known
 
-    def _propagated(self, plant: Plant, i: int, run_up: int | None) -> tuple[Array, Array]:
+    def _run_up(self, plant: Plant, i: int, hangs_on: tuple[float | str, ...], columns: list[int]) -> int | None:
+        """Samples before each segment from which on such a plant is propagated; None: from the beginning."""
         segments = self.segments[i]
-        return plant.track(segments.drive, segments.record.dt, segments.first, segments.smoothed, run_up)
 
-    def _run_up(self, plant: Plant, i: int, path: tuple[float | str, ...], columns: list[int]) -> int | None:
-        """Samples before each segment from which on such a plant is propagated; None: from the beginning.
-
-        It is what `_shortest_run_up` finds for the first plant with about the same values, whichever fit that was of.
-        """
-        segments = self.segments[i]
-        key = segments.first.tobytes(), tuple(map(_about, path))
-        if key not in segments.run_ups:
-            segments.run_ups[key] = self._shortest_run_up(plant, i, columns)
-        return segments.run_ups[key]
-
-    def _shortest_run_up(self, plant: Plant, i: int, columns: list[int]) -> int | None:
-        """Samples after which a plant has forgotten what it began with; None where that takes most of the record.
-
-        Tried are `LONGEST_MEMORY` and its doubles.
-        """
-        first = self.segments[i].first
-        gaps, samples = np.diff(first, prepend=0), LONGEST_MEMORY
-
-        def propagated(plant: Plant, run_up: int | None) -> Array:
-            states, memories = self._propagated(plant, i, run_up)
+        def propagated(plant: Plant, starts: Index, run_up: int | None) -> Array:
+            states, memories = plant.track(segments.drive, segments.record.dt, starts, segments.smoothed, run_up)
             return np.concatenate((states[:, columns], memories[:, plant.lasting_memories]), axis=1)
 
-        def saves() -> bool:
-            return bool(np.minimum(gaps, samples).sum() < _WORTH * first[-1])
+        def seek(least: int) -> int | None:
+            nudged = plant.with_parameters({"moving_mass": (1.0 + _NUDGE) * plant.value("moving_mass")})
+            return sufficient(len(segments.drive), partial(propagated, plant), partial(propagated, nudged), least)
 
-        if not saves():
-            return None
-        whole = propagated(plant, None)
-        ranges = np.ptp(whole, axis=0)
-        vague: Mask | None = None
-        while saves():
-            off = np.any(np.abs(propagated(plant, samples) - whole) > _SAME * ranges, axis=1)
-            if off.any() and vague is None:
-                nudged = plant.with_parameters({"moving_mass": (1.0 + _NUDGE) * plant.value("moving_mass")})
-                vague = np.any(np.abs(propagated(nudged, None) - whole) > _AMPLIFIED * ranges, axis=1)
-            if vague is None or not np.any(off & ~vague):
-                return samples
-            samples *= 2
-        return None
+        found, gaps = segments.run_ups.find(hangs_on, seek), np.diff(segments.first, prepend=0)
+        saves = found is not None and np.minimum(gaps, found).sum() < _WORTH * segments.first[-1]
+        return found if saves else None
 
     def _beside(self, plant: Plant, i: int) -> Plant:
         """The plant with what record ``i`` states of the machine."""
@@ -333,13 +304,6 @@ class Shooting:
             moved[:, index] += step
             jacobian[..., place] = (self._residual(plant, i, moved, inner) - base) / step
         return Projection.of(base, jacobian, *segments.all_nuisance)
-
-
-def _about(part: float | str) -> str | tuple[bool, float]:
-    """The sign and the nearest half octave of a value: of plants further apart one may remember longer."""
-    if isinstance(part, str):
-        return part
-    return part > 0.0, round(2.0 * math.log2(abs(part))) if part else -math.inf
 
 
 def better_of(
