@@ -139,11 +139,12 @@ def test_wrong_numbers_beside_a_missing_effect_are_named_as_such(model: Model) -
     assert found["residual"]["after"]["validation"] < 1.05
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("effect", "size", "others"),
     [
         ("hose_compliance", 0.4, {}),
-        pytest.param("sensor_offset", 0.4, {"constant_load": 300.0}, marks=pytest.mark.thorough),
+        ("sensor_offset", 0.4, {"constant_load": 300.0}),
     ],
 )
 def test_one_effect_is_simpler_than_two_numbers_that_say_the_same(
@@ -256,6 +257,7 @@ def test_slow_transducers_are_a_matter_of_the_recording(model: Model, runs) -> N
     assert found["residual"]["after"]["validation"] < 1.03
 
 
+@pytest.mark.thorough
 def test_a_transducer_that_reads_too_much_is_a_matter_of_the_recording(model: Model, runs) -> None:
     scaled = [{**run, "pressure_b": 1.03 * run["pressure_b"]} for run in runs]
     found = document(diagnose(model, records(scaled)))

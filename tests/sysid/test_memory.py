@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
@@ -42,6 +43,7 @@ def record(rate: float, seconds: float) -> Record:
     return Record.sampled("long", 1.0 / rate, channels)
 
 
+@pytest.mark.thorough
 def test_half_an_hour_is_diagnosed_in_a_gibibyte(tmp_path: Path) -> None:
     path = save(record(1000.0, 1800.0), tmp_path / "long.parquet")
     command = [sys.executable, "-c", PEAK, "--model", "sample_bench", "--record", str(path), "--out", str(tmp_path)]

@@ -161,6 +161,7 @@ def test_a_refit_takes_away_what_free_parameters_explain(base: Model) -> None:
     assert all(twice[p] >= left[p] for p in left)
 
 
+@pytest.mark.thorough
 def test_tight_limits_give_a_small_experiment_impossible_ones_an_error(base: Model) -> None:
     rivals = {name: base.with_effect(name) for name in ("valve_deadband", "valve_hysteresis")}
     tight = replace(limits_of(rivals), drive=2.0, travel=0.01, velocity=0.05)
