@@ -16,7 +16,7 @@ from hydraulic_sim.plant import LONGEST_MEMORY, Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.known_starts import KnownStarts
-from hydraulic_sysid.estimation.run_ups import RunUps
+from hydraulic_sysid.estimation.run_ups import RunUps, longest_worth
 from hydraulic_sysid.estimation.segments import STICK_SPEED, Segments, cut
 from hydraulic_sysid.estimation.shooting import Shooting
 
@@ -269,7 +269,8 @@ def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
     for known in (apart, apart.subset(np.array([False, True]))):
         other = Shooting(plant, [known])
         other.simulated(plant, other.initial_states)
-    assert len(run_ups) == tried + 2, "another fit knows it, and one to some of the segments"
+    # Another fit knows it, and one to some of the segments, unless a longer one is worth it for them, and might do.
+    assert len(run_ups) == tried + (2 if forgets else 4)
     slower = plant.with_parameters({f"{effect}.{memory}": 8.0 * plant.value(f"{effect}.{memory}")})
     Shooting(slower, [apart]).simulated(slower, states)
     assert len(run_ups) > tried + 3, "of another memory it is another"
@@ -286,17 +287,27 @@ class Never(RunUps):
 
 
 def test_a_run_up_is_of_plants_with_the_same_laws_and_values_like_these() -> None:
-    sought = []
+    sought, short, long = [], 2 * LONGEST_MEMORY, 16 * LONGEST_MEMORY
 
-    def seek(least: int) -> int | None:
-        sought.append(least)
-        return 4 * LONGEST_MEMORY if len(sought) == 1 else None
+    def seek(least: int, most: int) -> int | None:
+        sought.append((least, most))
+        return 4 * LONGEST_MEMORY if most == long and len(sought) < 3 else None
 
     known = RunUps()
-    found = [known.find(path, seek) for path in (("a", 1.0, 0.0), ("a", 3.0, 0.0), ("a", 0.3, 0.0))]
-    assert found == [4 * LONGEST_MEMORY] * 3 and sought == [LONGEST_MEMORY]
+    assert known.find(("a", 1.0, 0.0), short, seek) is None, "it is longer"
+    assert [known.find(("a", v, 0.0), long, seek) for v in (1.0, 3.0, 0.3)] == [4 * LONGEST_MEMORY] * 3
+    assert known.find(("a", 2.0, 0.0), short, seek) is None
+    assert sought == [(LONGEST_MEMORY, short), (2 * short, long)], "once each, and nothing that has failed"
     for path in (("a", 5.0, 0.0), ("a", -1.0, 0.0), ("a", 1.0, 1e-9)):
-        assert known.find(path, seek) is None
-    assert sought[1:] == [4 * LONGEST_MEMORY] * 3, "what is shorter than it did for none of these laws"
-    known.find(("b", 1.0, 0.0), seek)
-    assert sought[-1] == LONGEST_MEMORY
+        assert known.find(path, long, seek) is None
+    assert sought[2:] == [(4 * LONGEST_MEMORY, long)] * 3, "what is shorter did for none of these laws"
+    known.find(("b", 1.0, 0.0), long, seek)
+    assert sought[-1] == (LONGEST_MEMORY, long)
+
+
+@pytest.mark.parametrize(
+    ("first", "worth"),
+    [((500, 1000, 1500), 0), ((600, 1200, 1800), 1), ((4000, 12_000), 8), ((0,), 0), ((40,), 0)],
+)
+def test_a_run_up_is_worth_it_where_it_leaves_out_half_of_the_record(first: tuple[int, ...], worth: int) -> None:
+    assert longest_worth(np.array(first)) == worth * LONGEST_MEMORY

@@ -16,23 +16,35 @@ Propagated = Callable[[Index, "int | None"], Array]
 _SAME = 1e-3  # of the range of a state: off by less after a run-up, it is as from the beginning
 _AMPLIFIED = 1e-4  # of that range: what a nudge changes by so much no propagation knows (a load that rattles in a gap)
 _ALIKE = 4.0  # times larger or smaller are the values of plants that remember about as long
+_WORTH = 0.5  # of a record, beyond which run-ups to its segments save too little
 
 
-def sufficient(length: int, propagated: Propagated, nudged: Propagated, least: int = LONGEST_MEMORY) -> int | None:
-    """Samples of run-up after which a plant has forgotten what it began with; None where it does not.
+def longest_worth(first: Index) -> int:
+    """Samples of the longest run-up to segments at ``first`` (S,) that still saves much; 0: none does.
+
+    A double of `LONGEST_MEMORY`, or that.
+    """
+    gaps, samples = np.diff(first, prepend=0), 0
+    while np.minimum(gaps, max(2 * samples, LONGEST_MEMORY)).sum() < _WORTH * first[-1]:
+        samples = max(2 * samples, LONGEST_MEMORY)
+    return samples
+
+
+def sufficient(length: int, propagated: Propagated, nudged: Propagated, least: int, most: int) -> int | None:
+    """Samples of run-up after which a plant has forgotten what it began with; None where it has not after the ``most``.
 
     Tried are the ``least`` (a power of 2 times `LONGEST_MEMORY`) and its doubles, at samples of the record, of
     ``length``, that are twice as far apart: between those it would be propagated anyway. ``nudged`` is another plant
     that differs by nothing that is known.
     """
     starts = np.arange(2 * LONGEST_MEMORY, length, 2 * LONGEST_MEMORY)
-    if not len(starts):
+    every, most_every = least // LONGEST_MEMORY, min(most // LONGEST_MEMORY, len(starts))
+    if every > most_every:
         return None
     whole = propagated(starts, None)
     ranges = np.ptp(whole, axis=0)
     vague: Mask | None = None
-    every = least // LONGEST_MEMORY
-    while every <= len(starts):
+    while every <= most_every:
         chosen, samples = slice(every - 1, None, every), every * LONGEST_MEMORY
         off = np.any(np.abs(propagated(starts[chosen], samples) - whole[chosen]) > _SAME * ranges, axis=1)
         if off.any() and vague is None:
@@ -43,24 +55,42 @@ def sufficient(length: int, propagated: Propagated, nudged: Propagated, least: i
     return None
 
 
+@dataclass(frozen=True)
+class _Found:
+    """For ``values`` (K,): ``samples`` that do, or None of those up to the ``most`` that were tried."""
+
+    values: Array
+    samples: int | None
+    most: int
+
+    def answers(self, values: Array, most: int) -> bool:
+        """Whether it holds for these values, too, and says enough of run-ups up to the ``most``."""
+        if self.samples is None and self.most < most:
+            return False
+        larger, smaller = (f(np.abs(self.values), np.abs(values)) for f in (np.maximum, np.minimum))
+        return bool(np.all((np.sign(self.values) == np.sign(values)) & (larger <= _ALIKE * smaller)))
+
+
 @dataclass
 class RunUps:
     """The run-ups of one record that were found, by what a plant's memory hangs on."""
 
-    _known: dict[tuple[str, ...], list[tuple[Array, int | None]]] = field(default_factory=dict)
+    _known: dict[tuple[str, ...], list[_Found]] = field(default_factory=dict)
 
-    def find(self, hangs_on: tuple[float | str, ...], seek: Callable[[int], int | None]) -> int | None:
+    def find(
+        self, hangs_on: tuple[float | str, ...], most: int, seek: Callable[[int, int], int | None]
+    ) -> int | None:
         """That of the first plant with the same laws whose values are like these, or else what ``seek`` finds.
 
-        It is told what has done for such laws with other values, the shortest: shorter ones need not be tried.
+        None where it is more than the ``most``. ``seek`` is told the shortest that is worth trying, by what is known
+        of such laws with other values, and the ``most``.
         """
         names = tuple(part for part in hangs_on if isinstance(part, str))
         values = np.array([part for part in hangs_on if not isinstance(part, str)])
         known = self._known.setdefault(names, [])
-        for others, found in list(known):
-            larger, smaller = np.maximum(abs(others), abs(values)), np.minimum(abs(others), abs(values))
-            if np.all((np.sign(others) == np.sign(values)) & (larger <= _ALIKE * smaller)):
-                return found
-        found = seek(min((n for _, n in known if n is not None), default=LONGEST_MEMORY))
-        known.append((values, found))
-        return found
+        found = next((one for one in list(known) if one.answers(values, most)), None)
+        if found is None:
+            least = min((one.samples or 2 * one.most for one in known), default=LONGEST_MEMORY)
+            found = _Found(values, seek(least, most), most)
+            known.append(found)
+        return found.samples if found.samples is not None and found.samples <= most else None

@@ -17,13 +17,12 @@ from hydraulic_sim.plant import Plant
 from .parallel import results
 from .parameters import Parameters
 from .projection import Projection
-from .run_ups import sufficient
+from .run_ups import longest_worth, sufficient
 from .segments import Segments
 
 T = TypeVar("T")
 
 _NUDGE = 1e-6  # of the mass: no propagation knows it any better
-_WORTH = 0.7  # of a record, beyond which run-ups to its segments save nothing
 _MOST_KNOWN = 256  # propagations along a record that are kept
 _STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
 _STEP = 2e-3  # difference step of a parameter, of its value, …
@@ -265,18 +264,19 @@ class Shooting:
     def _run_up(self, plant: Plant, i: int, hangs_on: tuple[float | str, ...], columns: list[int]) -> int | None:
         """Samples before each segment from which on such a plant is propagated; None: from the beginning."""
         segments = self.segments[i]
+        most = longest_worth(segments.first)
+        if not most:
+            return None
 
         def propagated(plant: Plant, starts: Index, run_up: int | None) -> Array:
             states, memories = plant.track(segments.drive, segments.record.dt, starts, segments.smoothed, run_up)
             return np.concatenate((states[:, columns], memories[:, plant.lasting_memories]), axis=1)
 
-        def seek(least: int) -> int | None:
+        def seek(least: int, most: int) -> int | None:
             nudged = plant.with_parameters({"moving_mass": (1.0 + _NUDGE) * plant.value("moving_mass")})
-            return sufficient(len(segments.drive), partial(propagated, plant), partial(propagated, nudged), least)
+            return sufficient(len(segments.drive), partial(propagated, plant), partial(propagated, nudged), least, most)
 
-        found, gaps = segments.run_ups.find(hangs_on, seek), np.diff(segments.first, prepend=0)
-        saves = found is not None and np.minimum(gaps, found).sum() < _WORTH * segments.first[-1]
-        return found if saves else None
+        return segments.run_ups.find(hangs_on, most, seek)
 
     def _beside(self, plant: Plant, i: int) -> Plant:
         """The plant with what record ``i`` states of the machine."""
