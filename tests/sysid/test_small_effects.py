@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -10,7 +13,8 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search.search import Search
-from hydraulic_sysid.diagnosis.search.worth import NOTHING_LEFT
+from hydraulic_sysid.diagnosis.search.search_state import SearchState
+from hydraulic_sysid.diagnosis.search.worth import NOTHING_LEFT, borrowed
 from hydraulic_sysid.estimation.fit import FitSettings
 
 DT, SECONDS = 1e-3, 12.0
@@ -56,3 +60,21 @@ def test_a_load_that_the_file_does_not_know_is_found_beyond_its_bound(model: Mod
     area = base.model.value("piston_area_a") / model.value("piston_area_a")
     assert base.model.value("moving_mass") == pytest.approx(area * heavy, rel=0.01)
     assert base.misfit.little
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "own"),
+    [
+        ("valve_deadband", {"width": 0.02}, True),
+        ("backlash", {"mass": 1e-4, "gap": 2e-5, "frequency": 250.0}, False),
+    ],
+)
+def test_what_is_left_where_an_effect_vanishes_says_whether_its_gain_is_its_own(
+    model: Model, effect: str, values: dict, own: bool
+) -> None:
+    """A gram behind a stiff contact changes nothing but the steps of the integrator."""
+    looked = search(model, model.with_effect("valve_deadband", {"width": 0.02}) if own else model)
+    after = looked.state(model.with_effect(effect, values))
+    gained = looked.state(model).misfit.total if own else after.misfit.total + 50.0
+    before = SimpleNamespace(misfit=SimpleNamespace(total=gained))
+    assert borrowed(cast(SearchState, before), after, effect) is not own

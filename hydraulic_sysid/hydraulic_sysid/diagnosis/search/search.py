@@ -40,6 +40,7 @@ from .worth import (
     NOTHING_LEFT,
     PROMISES,
     anything,
+    borrowed,
     decisive,
     near_competitors,
     superfluous,
@@ -191,6 +192,8 @@ class Search(RecordingFits):
                 if not material(plain.misfit, better.misfit):
                     base = replace(plain, refits=base.refits, scores=base.scores)
                     path, better = [base], None
+            if better is not None and borrowed(path[-1], better, new_effect(better, path[-1])):
+                better = None
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
             doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= NOTHING_LEFT)
             loose = self.loose(path[-1]) if doubtful else None

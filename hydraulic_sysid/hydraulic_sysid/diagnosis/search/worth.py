@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from hydraulic_sim.errors import SimulationError
+
 from .candidates import observed, subsystem
 from .competing_models import competing_models
 from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material
@@ -24,6 +28,7 @@ SEEN = 0.0025  # of the residual, by which it must fall where nothing seemed to 
 EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
 MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
 ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
+OWN = 0.5  # of what an effect takes off, that must come back where it vanishes
 HOPELESS = 0.6  # of what noise does not explain: where less is explained, exchanging effects will not do either
 
 Enough = Callable[[str, Misfit, float], bool]
@@ -101,6 +106,26 @@ def without_competitor(base: SearchState, final: SearchState, name: str) -> bool
 def anything(name: str, after: Misfit, part: float) -> bool:
     """No more is asked than that a reduction is one."""
     return True
+
+
+def borrowed(before: SearchState, after: SearchState, name: str) -> bool:
+    """Whether an effect leaves hardly more where it vanishes, everything else being as it is: its gain is not its own.
+
+    A contact that swings fast has the plant integrated in shorter steps, even where nothing hangs on it. What is left
+    without an effect can only be less once all is fitted anew, so that what is its own comes back in full.
+    """
+    effect = after.model.library[name]
+    if observed(effect):  # it stands beside the linearisation
+        return False
+    point = after.linearisation.point
+    vanished = {f"{name}.{p.name}": p.null for p in effect.parameters if p.null is not None}
+    try:
+        raw = point.shooting.residuals(point.plant.with_parameters(vanished), point.initial_states)
+    except SimulationError:  # it does not run without it
+        return False
+    costs = [p.with_raw(r).costs for p, r in zip(point.projections, raw, strict=True)]
+    back = sum(float(np.sum(new - old)) for new, old in zip(costs, point.costs, strict=True))
+    return back < OWN * (before.misfit.total - after.misfit.total)
 
 
 def leaves_most(before: Misfit, after: Misfit, nothing: bool = False) -> bool:
