@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hydraulic_sim.arrays import Array
+from hydraulic_sim.arrays import Array, Index
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
@@ -16,7 +16,7 @@ from hydraulic_sim.plant import LONGEST_MEMORY, Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.known_starts import KnownStarts
-from hydraulic_sysid.estimation.run_ups import RunUps, longest_worth
+from hydraulic_sysid.estimation.run_ups import RunUps, longest_worth, sufficient
 from hydraulic_sysid.estimation.segments import STICK_SPEED, Segments, cut
 from hydraulic_sysid.estimation.shooting import Shooting
 
@@ -311,3 +311,14 @@ def test_a_run_up_is_of_plants_with_the_same_laws_and_values_like_these() -> Non
 )
 def test_a_run_up_is_worth_it_where_it_leaves_out_half_of_the_record(first: tuple[int, ...], worth: int) -> None:
     assert longest_worth(np.array(first)) == worth * LONGEST_MEMORY
+
+
+@pytest.mark.parametrize(("length", "found"), [(2000, None), (6000, 2 * LONGEST_MEMORY)])
+def test_a_short_record_is_propagated_as_a_whole(length: int, found: int | None) -> None:
+    """Of a state that forgets in 60 samples, at so few instants that they show no range of it, nothing is said."""
+
+    def propagated(starts: Index, run_up: int | None) -> Array:
+        since = starts if run_up is None else np.minimum(starts, run_up)
+        return (np.sin(starts) + np.exp(-since / 60.0))[:, None]
+
+    assert sufficient(length, propagated, propagated, LONGEST_MEMORY, 8 * LONGEST_MEMORY) == found

@@ -16,6 +16,7 @@ Propagated = Callable[[Index, "int | None"], Array]
 _SAME = 1e-3  # of the range of a state: off by less after a run-up, it is as from the beginning
 _AMPLIFIED = 1e-4  # of that range: what a nudge changes by so much no propagation knows (a load that rattles in a gap)
 _ALIKE = 4.0  # times larger or smaller are the values of plants that remember about as long
+_FEWEST = 4  # samples at which it is looked: fewer show no range of a state, and such a record is short
 _WORTH = 0.5  # of a record, beyond which run-ups to its segments save too little
 
 
@@ -39,7 +40,7 @@ def sufficient(length: int, propagated: Propagated, nudged: Propagated, least: i
     """
     starts = np.arange(2 * LONGEST_MEMORY, length, 2 * LONGEST_MEMORY)
     every, most_every = least // LONGEST_MEMORY, min(most // LONGEST_MEMORY, len(starts))
-    if every > most_every:
+    if every > most_every or len(starts) < _FEWEST:
         return None
     whole = propagated(starts, None)
     ranges = np.ptp(whole, axis=0)
