@@ -72,7 +72,7 @@ def test_a_load_that_the_file_does_not_know_is_found_beyond_its_bound(model: Mod
 def test_what_is_left_where_an_effect_vanishes_says_whether_its_gain_is_its_own(
     model: Model, effect: str, values: dict, own: bool
 ) -> None:
-    """A gram behind a stiff contact changes nothing but the steps of the integrator."""
+    """A tenth of a gram behind a stiff contact changes nothing but the steps of the integrator."""
     looked = search(model, model.with_effect("valve_deadband", {"width": 0.02}) if own else model)
     after = looked.state(model.with_effect(effect, values))
     gained = looked.state(model).misfit.total if own else after.misfit.total + 50.0

@@ -29,9 +29,8 @@ NODES = {
 
 
 def at_rest(states: Sequence[Any]) -> bool:
-    """A drive of 0 V, and the piston where it is to a micrometre per second."""
-    seconds = max(1.0, len(states) / RATE)
-    return {s.effort[1] for s in states} == {0.0} and float(np.ptp([s.position[0] for s in states])) < 1e-6 * seconds
+    """A drive of 0 V, and the piston where it is to a micrometre."""
+    return {s.effort[1] for s in states} == {0.0} and float(np.ptp([s.position[0] for s in states])) < 1e-6
 
 
 def short_plan(file: Path) -> Path:
@@ -89,7 +88,10 @@ def test_one_stands_stopped_beside_one_that_moves(
     assert {"/diagnostics"} == {name for name in recorded(tmp_path / "bag") if not name.startswith("/right/")}
     assert recorded(tmp_path / "bag")["/right/predicted_state"] > len(record)
     still = states["left"][stopped:]
-    assert len(still) > 0.5 * len(record) and at_rest(still)
+    assert len(still) > 0.5 * len(record)
+    # It creeps: the longer the test runs, the further. In every second it is at rest.
+    second = round(RATE)
+    assert all(at_rest(still[k : k + second]) for k in range(0, len(still), second))
 
 
 def names(node: Any) -> set[str]:

@@ -138,7 +138,7 @@ class Shooting:
         for share in shares:
             moved = self.corrected(initial_states, before, [share * p.raw for p in before])
             with suppress(SimulationError):  # from so far off it does not run
-                states, best = better_of((states, best), (moved, self._seen_from(before, plant, moved)))
+                states, best = better_of((states, best), (moved, self.seen_from(before, plant, moved)))
         return states, best
 
     def better(
@@ -146,9 +146,10 @@ class Shooting:
     ) -> tuple[list[Array], list[Projection]]:
         """Of two initial states of every segment those that leave less, in directions that are known."""
         tried = [p.with_raw(r) for p, r in zip(before, self.try_out(plant, one), strict=True)]
-        return better_of((one, tried), (other, self._seen_from(before, plant, other)))
+        return better_of((one, tried), (other, self.seen_from(before, plant, other)))
 
-    def _seen_from(self, before: Sequence[Projection], plant: Plant, states: Sequence[Array]) -> list[Projection]:
+    def seen_from(self, before: Sequence[Projection], plant: Plant, states: Sequence[Array]) -> list[Projection]:
+        """What another plant leaves with these initial states, in directions that are known."""
         return [p.with_raw(r) for p, r in zip(before, self.residuals(plant, states), strict=True)]
 
     def corrected(

@@ -120,11 +120,12 @@ def borrowed(before: SearchState, after: SearchState, name: str) -> bool:
     point = after.linearisation.point
     vanished = {f"{name}.{p.name}": p.null for p in effect.parameters if p.null is not None}
     try:
-        raw = point.shooting.residuals(point.plant.with_parameters(vanished), point.initial_states)
+        without = point.shooting.seen_from(
+            point.projections, point.plant.with_parameters(vanished), point.initial_states
+        )
     except SimulationError:  # it does not run without it
         return False
-    costs = [p.with_raw(r).costs for p, r in zip(point.projections, raw, strict=True)]
-    back = sum(float(np.sum(new - old)) for new, old in zip(costs, point.costs, strict=True))
+    back = sum(float(np.sum(new.costs - old)) for new, old in zip(without, point.costs, strict=True))
     return back < OWN * (before.misfit.total - after.misfit.total)
 
 
