@@ -35,6 +35,7 @@ class Frames:
         self._changed = threading.Condition(threading.Lock())
         self._raw: dict[int, bytes] = {}
         self._came: dict[int, int] = {}  # frames since the SYNC
+        self._unheard: set[int] = set(self._codecs)  # of which none has come since `forget`
         self._missing: set[int] = set(self._codecs)
         self._lacked = self._missing
         self._open = False
@@ -83,6 +84,7 @@ class Frames:
             return
         with self._changed:
             self._raw[cob_id] = data
+            self._unheard.discard(cob_id)
             owed = self.owed.get(cob_id, 0)
             before = 0 < received_ns < self._sent_ns
             if self._open and not before:
@@ -96,9 +98,10 @@ class Frames:
             self._owe(cob_id, owed - 1)
 
     def forget(self) -> None:
-        """Nobody owes anything."""
+        """Nobody owes anything, and nobody has been heard."""
         with self._changed:
             self.owed, self._steady = {}, {}
+            self._unheard = set(self._codecs)
 
     def debtors(self) -> list[str]:
         """Devices whose frames may be those of earlier SYNCs, with the number of cycles."""
@@ -137,9 +140,12 @@ class Frames:
             return cob_id in self._came
 
     def lacking(self) -> list[str]:
-        """Names of the devices whose frames were missing when the cycle ended; a frame may have come since."""
+        """Names of the devices whose frames were missing when the cycle ended; a frame may have come since.
+
+        Those alone of which none has come since `forget`, where there are such: in a single cycle any may be late.
+        """
         with self._changed:
-            lacked = sorted(self._lacked)
+            lacked = sorted(self._lacked & self._unheard or self._lacked)
         return list(dict.fromkeys(self._nodes[cob_id].name for cob_id in lacked))
 
     def quantities(self) -> dict[str, float]:

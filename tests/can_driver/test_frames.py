@@ -123,6 +123,21 @@ def test_nobody_owes_anything(cycles: Cycles) -> None:
     assert cycles.cycle(3) == 3
 
 
+def test_who_has_never_sent_is_named_alone_where_a_cycle_lacks_others_as_well(cycles: Cycles) -> None:
+    def held_up() -> list[str]:
+        cycles.frames.begin(time.time_ns())
+        cycles.frames.end()
+        return cycles.frames.lacking()
+
+    everybody = held_up()
+    assert "lvdt" in everybody and "valve" in everybody, "all have been heard before"
+    cycles.frames.forget()
+    cycles.cycle()
+    assert held_up() == ["lvdt"]
+    cycles.cycle(3)
+    assert held_up() == everybody
+
+
 @pytest.mark.parametrize("late", [1, 2, 3, 7])
 def test_every_sample_has_the_position_of_its_own_sync(patient: Bus, wire: Any, late: int) -> None:
     """An LVDT that says nothing for a while, then answers one SYNC, and then all at once, time and again."""
