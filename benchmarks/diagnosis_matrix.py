@@ -29,7 +29,6 @@ from pathlib import Path
 from hidden_effects import benches, family, matrix
 from hidden_effects.reliability_diagram import reliability_diagram
 from hydraulic_sysid import campaign
-from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_VALUES
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "diagnosis-matrix.md"
@@ -67,14 +66,13 @@ def main(argv: list[str] | None = None) -> int:
         for bench in chosen:
             print(benches.write(bench, options.write))
         return 0
-    most_values = QUICK_VALUES if options.quick else MOST_VALUES
     if options.report_only:
         names = {b.name for b in chosen}
-        found = [d for d in matrix.kept(options.out, most_values) if d["answer"]["name"] in names]
+        found = [d for d in matrix.kept(options.out, options.quick) if d["answer"]["name"] in names]
     else:
         crew = campaign.dask_cluster(options.scheduler) if options.scheduler else campaign.processes(options.processes)
         reference = not (options.no_reference or options.family or options.quick)
-        found = matrix.run(chosen, options.out, crew, reference, most_values)
+        found = matrix.run(chosen, options.out, crew, reference, options.quick)
     if not found:
         print("nothing was examined yet")
         return 1

@@ -15,7 +15,6 @@ from typing import Any
 
 from hydraulic_sysid import campaign
 from hydraulic_sysid.campaign.outcome import CASES
-from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES
 
 from . import benches, catalogue, family, scoring
 
@@ -38,9 +37,9 @@ def version() -> str:
     return digest.hexdigest()[:12]
 
 
-def examine(bench: benches.Bench, reference: bool = True, most_values: int = MOST_VALUES) -> dict[str, Any]:
+def examine(bench: benches.Bench, reference: bool = True, quick: bool = False) -> dict[str, Any]:
     """Make the bench, let it be diagnosed, and (``reference``) measure on records that the diagnosis never saw how
-    far it came, beside the true structure. No more than ``most_values`` measured values are used."""
+    far it came, beside the true structure; ``quick``: as `diagnose` has it."""
     from hydraulic_sim.model_file import load_model
     from hydraulic_sysid.data.records import read_all
     from hydraulic_sysid.data.results import plain
@@ -56,10 +55,10 @@ def examine(bench: benches.Bench, reference: bool = True, most_values: int = MOS
     answer = bench.answer()
     if bench.kind in scoring.TOGETHER:
         answer["visible"] = visible(bench, model, records)
-    found: dict[str, Any] = {"version": version(), "answer": answer, "most_values": most_values}
+    found: dict[str, Any] = {"version": version(), "answer": answer, "quick": quick}
     begin, busy = time.perf_counter(), time.process_time()
     try:
-        diagnosis = diagnose(model, records, most_values=most_values)
+        diagnosis = diagnose(model, records, quick=quick)
         found |= {"seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - busy}
         found["peak_MiB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         found["result"] = plain(diagnosis.result)
@@ -155,7 +154,7 @@ def run(
     folder: Path,
     crew: campaign.Crew,
     reference: bool = True,
-    most_values: int = MOST_VALUES,
+    quick: bool = False,
 ) -> list[dict[str, Any]]:
     """What is found for these benches, examined unless the folder has it of this state of the code; judged anew.
 
@@ -164,7 +163,7 @@ def run(
     now = version()
     cases = [
         campaign.Case(
-            campaign.digest([b.name, now, reference, most_values]), {"bench": b.name}, (b, reference, most_values)
+            campaign.digest([b.name, now, reference, quick]), {"bench": b.name}, (b, reference, quick)
         )
         for b in chosen
     ]
@@ -177,7 +176,7 @@ def run(
     return [_judged(dict(outcome.row), b.answer()) for outcome, b in found if not outcome.failed]
 
 
-def examined(argument: tuple[benches.Bench, bool, int], place: Path) -> dict[str, Any]:
+def examined(argument: tuple[benches.Bench, bool, bool], place: Path) -> dict[str, Any]:
     """The work of the campaign."""
     return examine(*argument)
 
@@ -192,12 +191,12 @@ def _told(progress: campaign.Progress) -> None:
         print(f"{found['cpu_seconds']:6.1f} s  {right}  {name:70s} {said}", flush=True)
 
 
-def kept(folder: Path, most_values: int = MOST_VALUES) -> list[dict[str, Any]]:
-    """All that was found in the present state of the code with so many values, judged anew."""
+def kept(folder: Path, quick: bool = False) -> list[dict[str, Any]]:
+    """All that was found in the present state of the code, by ``quick`` diagnoses or by full ones, judged anew."""
     outcomes = (json.loads(path.read_text()) for path in sorted((folder / CASES).glob("*.json")))
     found = [o["row"] for o in outcomes if o["state"] == "done"]
     now = version()
-    return [_judged(d, d["answer"]) for d in found if (d["version"], d.get("most_values")) == (now, most_values)]
+    return [_judged(d, d["answer"]) for d in found if (d["version"], d.get("quick")) == (now, quick)]
 
 
 def _judged(document: dict[str, Any], answer: dict[str, Any]) -> dict[str, Any]:

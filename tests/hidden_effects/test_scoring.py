@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from hidden_effects import benches, matrix, plant, scoring
 from hidden_effects.reliability_diagram import reliability_diagram
 from hydraulic_sysid.campaign.outcome import CASES
-from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_VALUES
 
 DEADBAND = {
     "name": "b", "kind": "single", "severity": "mild", "hidden": {"valve_deadband": {"width": 0.02}},
@@ -151,8 +150,8 @@ def test_selection_and_page(tmp_path):
     assert "| one hidden effect: right name first | ≥ 92 % | 1/1 = 100 % | 21…100 % |" in page
     assert matrix.kept(tmp_path) == []
     (tmp_path / CASES).mkdir()
-    for most, version in ((MOST_VALUES, matrix.version()), (QUICK_VALUES, matrix.version()), (MOST_VALUES, "another")):
-        row = outcome | {"version": version, "most_values": most}
-        (tmp_path / CASES / f"{most}-{version}.json").write_text(json.dumps({"state": "done", "row": row}))
-    assert [d["most_values"] for d in matrix.kept(tmp_path)] == [MOST_VALUES]
-    assert [d["most_values"] for d in matrix.kept(tmp_path, QUICK_VALUES)] == [QUICK_VALUES]
+    for quick, version in ((False, matrix.version()), (True, matrix.version()), (False, "another")):
+        row = outcome | {"version": version, "quick": quick}
+        (tmp_path / CASES / f"{quick}-{version}.json").write_text(json.dumps({"state": "done", "row": row}))
+    assert [d["quick"] for d in matrix.kept(tmp_path)] == [False]
+    assert [d["quick"] for d in matrix.kept(tmp_path, quick=True)] == [True]

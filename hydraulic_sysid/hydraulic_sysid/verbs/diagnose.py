@@ -21,7 +21,7 @@ from hydraulic_sim.model_file import Model, load_model, save_model
 from hydraulic_sysid.diagnosis.calibrate import FitSettings
 from hydraulic_sysid.diagnosis.proposed_effect import propose
 from hydraulic_sysid.diagnosis.search import diagnose
-from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_VALUES
+from hydraulic_sysid.diagnosis.search.holdout import QUICK_VALUES
 from hydraulic_sysid.verbs import _diagnosis_table
 from hydraulic_sysid.verbs import _options as opt
 
@@ -51,8 +51,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--quick",
         action="store_true",
-        help=f"use about {QUICK_VALUES} measured values, spread over all records, not up to {MOST_VALUES}: an answer "
-        "in seconds, which misses what is small",
+        help=f"use about {QUICK_VALUES} measured values, spread over all records, and leave out what only confirms: an "
+        "answer in seconds, which misses what is small",
     )
     parser.add_argument(
         "--propose",
@@ -72,7 +72,7 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     validation = opt.read_kept_back(options.holdout, options)
     done = diagnose(
         model, records, validation, FitSettings(length=options.segment), say, options.within, opt.watch(options),
-        QUICK_VALUES if options.quick else MOST_VALUES,
+        options.quick,
     )  # fmt: skip
     kind = done.result["verdict"]["kind"]
     models = {f"competing_{name}.yaml": model for name, model in done.competing.items()}

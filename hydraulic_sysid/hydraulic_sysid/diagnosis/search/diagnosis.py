@@ -20,7 +20,6 @@ from hydraulic_sysid.estimation.fit import FitSettings
 from . import verdict as verdicts
 from .data_sheet import as_filed, tolerances
 from .document import document, with_balances
-from .holdout import MOST_VALUES
 from .linearisation import Linearisation
 from .misfit import explained
 from .nonparametric_curves import NonparametricCurve, nonparametric_curves
@@ -83,22 +82,23 @@ def diagnose(
     progress: Callable[[str], None] | None = None,
     within: float | None = None,
     watch: Watch | None = None,
-    most_values: int = MOST_VALUES,
+    quick: bool = False,
 ) -> Diagnosis:
     """Find the library effects that ``model`` lacks to explain ``records``.
 
     Parameters are fitted to ``records``; an effect counts only if it lowers the error on ``validation`` too (default:
     every third block of every record). Records need drive and position; pressures distinguish more. After ``within``
     seconds, or when the user ends it (KeyboardInterrupt), the best so far is the answer, marked as such. ``watch``
-    takes what is found meanwhile: the residual whenever it is lower, and the table of candidates. No more than
-    ``most_values`` measured values are used, spread over all records.
+    takes what is found meanwhile: the residual whenever it is lower, and the table of candidates. A ``quick`` search
+    uses fewer measured values, spread over all records, and leaves out what only confirms: whether noise hides small
+    effects, whether one effect does what several numbers do, and the balances of the whole records.
 
     :raises DiagnosisError: no records, or unusable ones.
     :raises hydraulic_sim.errors.ModelError: a model that does not compose.
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
     say = progress or (lambda _: None)
-    search = Search.of(model, records, validation, settings or FitSettings(), say, within, watch, most_values)
+    search = Search.of(model, records, validation, settings or FitSettings(), say, within, watch, quick)
     say("the records against the model file")
     checked = contradictions(model, [*records, *validation])
     found = verdicts.conclusive(search.run())
@@ -120,6 +120,7 @@ def diagnose(
             found = search.with_final_values(found)
         known = parameter_errors(found.final.linearisation, tolerances(found.model))
         whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
+        whole["settings"] = {**whole["settings"], "quick": quick}
         done = as_filed(finished(found, known), model)
         competing = {
             name: as_filed(search.with_exact_laws(other, found.split), model)
@@ -132,6 +133,8 @@ def diagnose(
         asked = outside and verdicts.drifting_effect(found) is None  # which says by itself where it is
         suspected = None if not asked else before if proxy else after
         del found, suspect  # their sensitivities would take up the memory that the balances need
+        if quick and suspected is None:
+            return Diagnosis(done, competing, whole, remaining)
         say("balances")
         rows, where = _balances(before, records, before is suspected)
         rows_after, where_after = _balances(after, records, after is suspected) if after else ([], [])

@@ -27,7 +27,7 @@ from .candidates import observed
 from .data_sheet import priors, significant
 from .errors import DiagnosisError
 from .frozen_jacobian import refit_rounded
-from .holdout import MOST_VALUES, Split, split
+from .holdout import MOST_VALUES, QUICK_VALUES, Split, split
 from .linearisation import Linearisation
 from .misfit import SIGNIFICANT, Misfit, material, misfit
 from .progress import Progress, Watch
@@ -63,6 +63,8 @@ class Task:
     short: Callable[[], Split]
     settings: FitSettings
     say: Progress
+    quick: bool = False
+    """Whether what only confirms is left out."""
 
 
 class Fitting:
@@ -70,7 +72,7 @@ class Fitting:
 
     def __init__(self, task: Task) -> None:
         self.given, self.split, self.short, self.settings = task.given, task.split, task.short, task.settings
-        self.say = task.say
+        self.say, self.quick = task.say, task.quick
         self.path: list[SearchState] = []
         """The model and what it became with each effect added, as far as the search has come."""
         self.priors = priors(task.given)
@@ -82,13 +84,13 @@ class Fitting:
     @classmethod
     def of(
         cls: type[F], model: Model, records: Sequence[Record], validation: Sequence[Record], settings: FitSettings,
-        say: Say, within: float | None = None, watch: Watch | None = None, most_values: int = MOST_VALUES,
+        say: Say, within: float | None = None, watch: Watch | None = None, quick: bool = False,
     ) -> F:  # fmt: skip
         """Cut the records; free parameters without bounds get those of a data sheet.
 
         :param within: seconds after which the search ends with the best so far
         :param watch: takes what is found meanwhile
-        :param most_values: measured values that are used, spread over all records
+        :param quick: fewer values, spread over all records, and nothing that only confirms
         :raises DiagnosisError: there are no records, or one cannot be cut.
         """
         if not records:
@@ -96,11 +98,12 @@ class Fitting:
         model = bounded(model)
         length = settings.seconds(model, [*records, *validation])
         try:
-            cuts = split(records, validation, model, length, most_values)
+            most = QUICK_VALUES if quick else MOST_VALUES
+            cuts = split(records, validation, model, length, most)
             quarter = shorter(length, SHORTER, [*records, *validation])
-            short = partial(split, records, validation, model, quarter, most_values)
+            short = partial(split, records, validation, model, quarter, most)
             progress = Progress(say, within, watch or (lambda _: None))
-            return cls(Task(model, cuts, short, replace(settings, length=length), progress))
+            return cls(Task(model, cuts, short, replace(settings, length=length), progress, quick))
         except SegmentError as error:
             raise DiagnosisError(str(error)) from None
 

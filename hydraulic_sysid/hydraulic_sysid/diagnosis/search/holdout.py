@@ -28,7 +28,7 @@ from .set_aside import SetAside, set_aside
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
 MOST_VALUES = 80_000  # measured values of all segments, spread: 27 s of three channels at 1 kHz; more hardly say more …
-QUICK_VALUES = 40_000  # … and for an answer in seconds: thirteen; half as many miss every sixth effect
+QUICK_VALUES = 24_000  # … and for an answer in seconds: eight; what is small is missed
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
 LOPSIDED = 4.0  # times what the values of one role leave beyond the noise, from which the other has seen little of it

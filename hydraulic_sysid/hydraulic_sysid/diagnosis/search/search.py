@@ -80,7 +80,7 @@ class Search(RecordingFits):
         :raises OutOfTimeError: before there was anything.
         """
         try:
-            concluded = self.set_against_faults(self.concluded(decisive(self.searched())))
+            concluded = self.set_against_faults(self.concluded(decisive(self.searched()), others=not self.quick))
             found = accidents_named(self.by_force(concluded))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)
