@@ -410,11 +410,15 @@ def test_command_that_does_not_exist_is_named(tmp_path: Path) -> None:
         run_step("x", ["/no/such/command"], log=tmp_path / "l", environ={}, cwd=tmp_path, remedy="")
 
 
-def test_interrupted_step_takes_its_children_along(tmp_path: Path) -> None:
+@pytest.mark.parametrize("deaf", [False, True])
+def test_interrupted_step_takes_its_children_along(tmp_path: Path, deaf: bool) -> None:
+    """Also one that does not hear the signal that ends the command."""
     pid_file = tmp_path / "pid"
     code = (
-        "import subprocess, sys, time\n"
+        "import signal, subprocess, sys, time\n"
+        f"signal.signal(signal.SIGINT, signal.{'SIG_IGN' if deaf else 'default_int_handler'})  # inherited\n"
         "child = subprocess.Popen([sys.executable, '-ES', '-c', 'import time; time.sleep(600)'])\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         f"open({str(pid_file)!r}, 'w').write(str(child.pid))\n"
         "time.sleep(600)\n"
     )

@@ -171,4 +171,7 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, how)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(patience)
-            return
+            break
+    # A child that was only starting may have lost the signal, and would outlive the command.
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
