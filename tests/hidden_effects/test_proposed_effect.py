@@ -53,7 +53,7 @@ def document(folder: Path, verb: str) -> dict[str, Any]:
 def test_what_no_library_knows_is_proposed_joined_and_explains_the_records(bench: Path, capsys) -> None:
     known, unseen, effect = str(bench / "known"), str(bench / "unseen"), bench / "worn_barrel.py"
     command = ["--model", str(bench / "model.yaml"), "--record", known]
-    assert diagnose([*command, "--propose", str(effect), "--apply", "--out", str(bench / "before")]) == 1
+    assert diagnose([*command, "--quick", "--propose", str(effect), "--apply", "--out", str(bench / "before")]) == 1
     found = document(bench / "before", "diagnose")
     assert found["verdict"]["kind"] == "outside the library", found["verdict"]["text"]
     proposed = found["proposed_effect"]
@@ -73,6 +73,6 @@ def test_what_no_library_knows_is_proposed_joined_and_explains_the_records(bench
     assert "worn_barrel" in joined.effects and joined.history[-1]["change"] == "added worn_barrel"
 
     command = ["--model", str(bench / "joined" / "model.yaml"), "--record", known, unseen]
-    assert diagnose([*command, "--propose", str(bench / "more.py"), "--out", str(bench / "after")]) == 0
+    assert diagnose([*command, "--quick", "--propose", str(bench / "more.py"), "--out", str(bench / "after")]) == 0
     assert document(bench / "after", "diagnose")["verdict"]["kind"] == "complete"
     assert not (bench / "more.py").exists() and "not outside the library" in capsys.readouterr().err

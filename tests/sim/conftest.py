@@ -76,4 +76,4 @@ def small_library(monkeypatch: pytest.MonkeyPatch, bare: Model) -> Model:
     full = registry.library()
     small = registry.Library([full.file("end_stop")])
     monkeypatch.setattr(registry, "_BUILTIN", [small])
-    return replace(bare, entries={key: entry for key, entry in bare.entries.items() if "." not in key})
+    return replace(bare, entries={k: entry for k, entry in bare.entries.items() if "." not in k}, document=None)

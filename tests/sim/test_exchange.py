@@ -307,13 +307,13 @@ def test_value_references_match_the_c_side(made: Path) -> None:
         assert found[name][-1] == pytest.approx(truth[name][-1], rel=1e-9, abs=1e-12), name
 
 
-def test_an_effect_of_the_users_own_is_exported_too(tmp_path: Path) -> None:
+def test_an_effect_of_the_users_own_is_exported_too(tmp_path: Path, small_library: Model) -> None:
     file = Path(__file__).parents[2] / "examples" / "user_effects" / "seal_drag.py"
-    model = load_model("sample_bench").with_effect_file(file).with_effect("seal_drag")
+    model = small_library.with_effect_file(file).with_effect("seal_drag")
     write_fmu(model, tmp_path / "own.fmu", RATE)
     drive = multisine(4.0)
     truth = Plant(model).simulate(drive, 1.0 / RATE)["position"]
-    without = Plant(load_model("sample_bench")).simulate(drive, 1.0 / RATE)["position"]
+    without = Plant(model.without_effect("seal_drag")).simulate(drive, 1.0 / RATE)["position"]
     found = ForeignFmu(tmp_path / "own.fmu").simulate(drive, 1.0 / RATE)["position"]
     assert np.abs(truth - without).max() > 1e-5  # it matters
     assert np.abs(found - truth).max() <= 1e-6 * np.ptp(truth)
@@ -352,14 +352,14 @@ EFFECT = Effect(
 """
 
 
-def test_what_python_and_c_do_otherwise_is_done_as_in_python(tmp_path: Path) -> None:
+def test_what_python_and_c_do_otherwise_is_done_as_in_python(tmp_path: Path, small_library: Model) -> None:
     """A loop's bound and counter, remainders of negative numbers, division of whole ones, a flag that changes."""
     (tmp_path / "odd_friction.py").write_text(PIECE)
-    model = load_model("sample_bench").with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
+    model = small_library.with_effect_file(tmp_path / "odd_friction.py").with_effect("odd_friction")
     write_fmu(model, tmp_path / "odd.fmu", RATE)
     drive = multisine(3.0)
     truth = Plant(model).simulate(drive, 1.0 / RATE)["position"]
-    without = Plant(load_model("sample_bench")).simulate(drive, 1.0 / RATE)["position"]
+    without = Plant(model.without_effect("odd_friction")).simulate(drive, 1.0 / RATE)["position"]
     found = ForeignFmu(tmp_path / "odd.fmu").simulate(drive, 1.0 / RATE)["position"]
     assert np.abs(truth - without).max() > 1e-5
     assert np.abs(found - truth).max() <= 1e-9 * np.ptp(truth)

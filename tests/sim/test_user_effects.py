@@ -168,6 +168,7 @@ def test_a_changed_constant_reaches_two_processes_compiling_at_once(workshop: Wo
     assert not list(workshop.cache.rglob(".*"))
 
 
+@pytest.mark.thorough
 def test_a_damaged_cache_is_made_anew(workshop: Workshop) -> None:
     binaries = [f for f in workshop.cache.rglob("*") if f.suffix in (".nbi", ".nbc")]
     assert binaries, "nothing was cached"

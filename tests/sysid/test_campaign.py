@@ -135,6 +135,7 @@ def _of_group(group: int) -> list[int]:
     return found
 
 
+@pytest.mark.thorough
 def test_a_dask_cluster_gives_what_processes_give(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     from hydraulic_sysid.campaign.verb_case import verb_cases, work

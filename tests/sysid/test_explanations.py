@@ -127,6 +127,7 @@ def test_areas_that_say_the_same_are_both_named(model: Model) -> None:
     assert other["standard_error"] < 0.02 * other["nominal"] and f", or {other['key']} is" in found["verdict"]["text"]
 
 
+@pytest.mark.thorough
 def test_wrong_numbers_beside_a_missing_effect_are_named_as_such(model: Model) -> None:
     """The effect hides at first what they do, so that the data sheet is asked again once it is there."""
     off = {"piston_area_b": 0.97, "supply_pressure": 1.03}
@@ -308,6 +309,7 @@ def test_noise_on_the_recorded_drive_is_a_matter_of_the_recording(model: Model, 
     assert fault["size"] == pytest.approx(0.03, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_a_slow_log_of_a_fast_drive_is_a_matter_of_the_recording(model: Model) -> None:
     """Whoever logs every fourth sample of a drive that jumps at any time does not know what the valve got."""
     plant, draw, slow = Plant(model), np.random.default_rng(9), []

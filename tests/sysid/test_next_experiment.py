@@ -172,6 +172,7 @@ def test_tight_limits_give_a_small_experiment_impossible_ones_an_error(base: Mod
         next_experiment(rivals, replace(tight, pressure_min=10e6), NOISE, 3.0)
 
 
+@pytest.mark.thorough
 def test_equal_rivals_are_said_to_be_so(base: Model) -> None:
     rivals = {"one": base, "other": base.with_effect("valve_null_bias", {"bias": 0.0})}
     document = next_experiment(rivals, limits_of(rivals), NOISE, 3.0).document
@@ -204,6 +205,7 @@ def test_the_way_to_a_position_arrives(base: Model) -> None:
     assert np.abs(run.drive).max() <= bench.drive
 
 
+@pytest.mark.thorough
 def test_an_axis_without_hydraulics() -> None:
     axis = Model(
         name="axis",

@@ -196,7 +196,8 @@ def excited(run: Demo, wait_until: Callable[..., Any], log: str = "excitation_ch
     wait_until(started, f"the excitation to start ({log})", PATIENCE_S)
 
 
-@pytest.mark.parametrize("node", ["recorder", pytest.param("excitation", marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("node", ["recorder", "excitation"])
 def test_a_node_that_dies_fails_its_step_and_ends_the_run(demo: Any, wait_until: Any, node: str) -> None:
     run = demo("--quick", "--no-lockstep")  # which leaves time to kill it
     excited(run, wait_until)

@@ -76,7 +76,8 @@ def plant_source(model: Model, rate: float) -> PlantSource:
     for name, text in (("relax", module), ("run", module), ("see", _see(layout))):
         result = "long" if name == "run" else "double"
         tree = tree_of(text, name)
-        arrays = arrays_of(tree, scope)
+        # The memories are an array also where no effect has any.
+        arrays = arrays_of(tree, scope) | {a.arg for a in tree.args.args if a.arg == "M"}
         returns = 0 if name == "see" else 1
         function = Function(f"plant_{name}", tree, scope, "the plant", known, arrays, _WHOLE, returns, result)
         parts.append(Translator(function).text())
