@@ -25,10 +25,11 @@ from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material, reduction
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
+from hydraulic_sysid.diagnosis.search.posterior import explanations
 from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError, Progress
 from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, RecordingFault
 from hydraulic_sysid.diagnosis.search.search import Search
-from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
+from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState, Together
 from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
 from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
 from hydraulic_sysid.diagnosis.search.worth import (
@@ -550,6 +551,60 @@ def test_a_fault_of_the_recording_that_explains_the_same_is_named_beside_the_eff
     assert judged.kind == verdict.INDISTINGUISHABLE and judged.possible == ["pressure_offset"]
     said = verdict.sentences(found, judged, [])
     assert said.startswith("Missing: pressure_offset, or nothing is, and pressure_a reads 5.0 % too much. These data")
+
+
+def with_gain_and_supply(model: Model, left: float) -> tuple[SearchResult, SearchState]:
+    """A search that ended with a gain and another supply pressure, which leave so much; a state with the effect."""
+    gain = RecordingFault(next(h for h in HYPOTHESES if h.name == "pressure_a_gain"), 0.05, 1e-3, 9000.0)
+    supply = Deviation("supply_pressure", 14.0e6, 14.1e6, 2e4, 900.0)
+    base, final = state(model, 3000 * 4.0, {}), state(model, left, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {}, {}, moved=(supply,), faults=(gain,))
+    return replace(found, as_recorded=base), state(model.with_effect("pressure_offset"), 3000.0, {})
+
+
+@pytest.mark.parametrize(
+    ("left", "free", "named"),
+    [
+        (2999.0, 2, True),  # hardly less than the effect alone
+        (2900.0, 2, False),  # clearly less
+        (2999.0, 3, False),  # an effect that has more free than there are causes
+    ],
+)
+def test_one_effect_is_named_before_a_fault_and_a_number_that_explain_the_same_together(
+    model: Model, monkeypatch: pytest.MonkeyPatch, left: float, free: int, named: bool
+) -> None:
+    found, effect = with_gain_and_supply(model, left)
+    offset = effect.model.library["pressure_offset"]
+    more = (*offset.parameters, replace(offset.parameters[0], name="offset_tank"))[:free]
+    library = {"pressure_offset": replace(offset, parameters=more)}
+    effect = replace(effect, model=SimpleNamespace(library=library, effects=effect.model.effects))  # type: ignore[arg-type]
+    search = object.__new__(Search)
+    search.split, search._beaten = found.split, effect
+    monkeypatch.setattr(Search, "with_moved", lambda self, state, moved: state)
+    monkeypatch.setattr(Search, "explore", lambda self, base, most: base)
+    monkeypatch.setattr(Search, "_strict", lambda self, base: True)
+    done = search.set_against_effect(found)
+    assert done.added == (["pressure_offset"] if named else [])
+    assert bool(done.faults) is bool(done.moved) is not named
+    assert [f.hypothesis.name for f in done.together_instead.faults] == (["pressure_a_gain"] if named else [])
+
+
+def test_a_fault_and_a_number_that_explain_the_same_together_are_named_beside_the_effect(model: Model) -> None:
+    found, effect = with_gain_and_supply(model, 3000.0)
+    instead = Together(found.faults, found.moved)
+    found = replace(
+        found, final=effect, misfits={"pressure_offset": effect.misfit}, moved=(), faults=(), together_instead=instead
+    )
+    judged = verdict.judge(found)
+    assert judged.kind == verdict.INDISTINGUISHABLE and judged.possible == ["pressure_offset"]
+    said = verdict.sentences(found, judged, [])
+    assert said.startswith(
+        "Missing: pressure_offset, or nothing is, and pressure_a reads 5.0 % too much and supply_pressure is 141"
+    )
+    likeliest = explanations(found, judged)[:2]
+    assert [(e.effects, e.numbers, e.faults, e.named) for e in likeliest] == [
+        (("pressure_offset",), (), (), True), ((), ("supply_pressure",), ("pressure_a_gain",), True)
+    ]  # fmt: skip
 
 
 def held_numbers(off: Sequence[float], correlation: float = 0.0) -> HeldNumbers:

@@ -97,10 +97,10 @@ def document(
             for name, every in verdict.competing.items()
         },
         "data_sheet": [_number(result, d) for d in result.moved],
-        "data_sheet_instead": [_number(result, d) for d in result.numbers_instead],
+        "data_sheet_instead": [_number(result, d) for d in [*result.numbers_instead, *result.together_instead.numbers]],
         "recording": {
             "faults": [_fault(f) for f in result.faults],
-            "instead": [_fault(f) for f in result.faults_instead],
+            "instead": [_fault(f) for f in [*result.faults_instead, *result.together_instead.faults]],
             "spikes": [
                 {
                     "channel": s.channel,

@@ -116,6 +116,10 @@ def _known(result: SearchResult, verdict: Verdict) -> dict[What, tuple[float, bo
             found.setdefault((tuple(other if e == name else e for e in effects), numbers, faults), said)
     for fault in result.faults_instead:
         found.setdefault(((), numbers, (*faults, fault.hypothesis.name)), (1.0, tie))
+    several = result.together_instead
+    if several.faults:
+        keys, names = tuple(d.key for d in several.numbers), tuple(f.hypothesis.name for f in several.faults)
+        found.setdefault((effects[:-1], keys, names), (1.0, tie))
     for d in result.moved:
         rest = tuple(key for key in numbers if key != d.key)
         for number in d.alternatives:
@@ -123,6 +127,6 @@ def _known(result: SearchResult, verdict: Verdict) -> dict[What, tuple[float, bo
         for effect in d.instead:
             found.setdefault(((*effects, effect), rest, faults), (1.0, True))
     if result.numbers_instead:
-        every = (*numbers, *(d.key for d in result.numbers_instead))
-        found.setdefault((effects[:-1], every, faults), (1.0 / ODDS, False))
+        others = (*numbers, *(d.key for d in result.numbers_instead))
+        found.setdefault((effects[:-1], others, faults), (1.0 / ODDS, False))
     return found

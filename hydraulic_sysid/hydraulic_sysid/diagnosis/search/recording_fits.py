@@ -9,16 +9,16 @@ from functools import partial
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 
-from .candidate_fits import FULL, NEAR, PROMISED
+from .candidate_fits import FULL, LATER_REFITS, NEAR, PROMISED
 from .data_sheet import relaxed, restored
-from .data_sheet_fits import DataSheetFits
+from .data_sheet_fits import DataSheetFits, new_effect
 from .drive_faults import costs_with
 from .fitting import Task, worse
 from .holdout import Split
 from .misfit import explained, material, misfit
 from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import negligible
-from .search_state import FaultFit, SearchResult, SearchState
+from .search_state import FaultFit, SearchResult, SearchState, Together
 from .worth import FURTHER, NOTHING_LEFT, PROMISES, enough_at_first, leaves_most
 
 MOST_FAULTS = 3  # of the recording
@@ -39,7 +39,9 @@ class RecordingFits(DataSheetFits):
         """Other faults, that explain about as much as the best candidate."""
         self._first_effect: tuple[SearchState | None, SearchState | None] = (None, None)
         self.as_recorded: SearchState | None = None
-        """Before any fault was assumed."""
+        """Before any fault was assumed, …"""
+        self._beaten: SearchState | None = None
+        """… and with the effect that explained less than the first fault, the data sheet as loose as it was."""
         self._assumed = 0
         """How many faults were, named or not."""
 
@@ -71,6 +73,8 @@ class RecordingFits(DataSheetFits):
             if effect is not None and effect.misfit.total < found.misfit.total:
                 self._first_effect = base, effect
                 break
+            if self.as_recorded is None:
+                self._beaten = effect
             self.assume(found, base, base)
             self.path = [found.state]
             base = self.loosened(self.judged(found.state))
@@ -208,6 +212,33 @@ class RecordingFits(DataSheetFits):
             )
             same += [tied.fault] if tied is not None else []
         return replace(found, faults_instead=tuple(same))
+
+    def set_against_effect(self, found: SearchResult) -> SearchResult:
+        """With the one effect that explains by itself what a fault and other numbers of the data sheet do.
+
+        With all of the data sheet within its tolerance a fault may have explained more than it. One cause is simpler
+        than several that happen to come together.
+        """
+        base, effect = found.as_recorded, self._beaten
+        if found.added or not (found.faults and found.moved) or base is None or effect is None:
+            return found
+        name, causes = new_effect(effect, base), len(found.faults) + len(found.moved)
+        if sum(p.free for p in effect.model.library[name].parameters) > causes:
+            return found
+        before, self.split = self.split, base.linearisation.split
+        try:
+            alone = self.with_moved(effect, ())
+            if not worse(alone.misfit, found.final.misfit):
+                strict = self.explore(base if self._strict(base) else self.with_moved(base, ()), LATER_REFITS)
+                return replace(
+                    found, split=self.split, base=strict, final=alone, misfits={name: alone.misfit},
+                    competing={name: strict}, moved=(), faults=(), as_recorded=None,
+                    together_instead=Together(found.faults, found.moved),
+                )  # fmt: skip
+        except SimulationError:  # the data sheet as it is does not run with what was fitted
+            pass
+        self.split = before
+        return found
 
     def as_good(self, found: SearchResult, model: Model, fault: RecordingFault) -> FaultFit | None:
         """A model with a fault of the recording, if together they explain what was found."""

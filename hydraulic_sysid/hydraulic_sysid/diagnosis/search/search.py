@@ -80,7 +80,8 @@ class Search(RecordingFits):
         :raises OutOfTimeError: before there was anything.
         """
         try:
-            concluded = self.set_against_faults(self.concluded(decisive(self.searched()), others=not self.quick))
+            concluded = self.concluded(decisive(self.searched()), others=not self.quick)
+            concluded = self.set_against_effect(self.set_against_faults(concluded))
             found = accidents_named(self.by_force(concluded))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)

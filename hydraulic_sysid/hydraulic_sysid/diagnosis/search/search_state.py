@@ -76,13 +76,22 @@ class FaultFit:
 
 
 @dataclass(frozen=True)
+class Together:
+    """Faults of the recording and numbers of the data sheet that explain something only all together."""
+
+    faults: Sequence[RecordingFault] = ()
+    numbers: Sequence[Deviation] = ()
+
+
+@dataclass(frozen=True)
 class SearchResult:
     """Where a search ended.
 
     ``model``: as it was given; ``misfits``: after each effect that was added, the one that explains most first;
     ``competing[name]``: the state without that effect, with what was tried in its place; ``as_recorded``: the state
     before any fault of the recording was assumed; ``drift``: of the final model along the records; ``faults_instead``:
-    that explain what the one effect added does; ``numbers_instead``: what the effect added last does, only together.
+    that explain what the one effect added does, each by itself; ``together_instead``: that do it together;
+    ``numbers_instead``: what the effect added last does, only together.
     """
 
     model: Model
@@ -95,6 +104,7 @@ class SearchResult:
     moved: Sequence[Deviation] = ()
     faults: Sequence[RecordingFault] = ()
     faults_instead: Sequence[RecordingFault] = ()
+    together_instead: Together = Together()
     numbers_instead: Sequence[Deviation] = ()
     as_recorded: SearchState | None = None
     drift: Drift | None = None

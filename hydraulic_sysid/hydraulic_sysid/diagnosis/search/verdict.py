@@ -23,7 +23,7 @@ from .drive_faults import DriveHypothesis
 from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
 from .nonparametric_curves import NonparametricCurve
 from .remainder import NOTHING, Remainder, Spikes, immaterial
-from .search_state import SearchResult
+from .search_state import SearchResult, Together
 from .set_aside import DIFFERENT, FAR_OFF, SATURATED, SetAside
 from .whiteness import Whiteness
 from .worth import FURTHER
@@ -85,7 +85,10 @@ def conclusive(result: SearchResult) -> SearchResult:
     """
     vague = drive_blamed(result) and (result.base.misfit.variance < VAGUE or kind_of(result, tied=False) == OUTSIDE)
     if result.added and vague:
-        return replace(result, final=result.base, misfits={}, competing={}, faults_instead=(), drift=None)
+        return replace(
+            result, final=result.base, misfits={}, competing={}, faults_instead=(), together_instead=Together(),
+            drift=None,
+        )  # fmt: skip
     return result
 
 
@@ -99,7 +102,8 @@ def judge(result: SearchResult) -> Verdict:
 
 def reviewed(verdict: Verdict, result: SearchResult, curves: Sequence[NonparametricCurve] = ()) -> Verdict:
     """The verdict with its kind; ``curves``: what any law may explain of what is left, where that is known."""
-    tied = any(verdict.indistinguishable_from(name) for name in verdict.added) or bool(result.faults_instead)
+    tied = any(verdict.indistinguishable_from(name) for name in verdict.added)
+    tied = tied or bool(result.faults_instead or result.together_instead.faults)
     return replace(verdict, kind=kind_of(result, tied, curves))
 
 
@@ -272,7 +276,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
             same = verdict.indistinguishable_from(name)
             parts.append(f"one of {{{', '.join([name, *same])}}}" if same else name)
         why = _why_alike(result.model) if verdict.family else ""
-        faults = "".join(f", or nothing is, and {f.text}" for f in result.faults_instead)
+        faults = "".join(f", or nothing is, and {said}" for said in _recording_instead(result))
         return " ".join([f"Missing: {_and(parts)}{faults}. These data cannot distinguish them. {fell}{why}", *beside])
     none = "no effect of it explains what is left"
     drift = decisive_drift(result)
@@ -460,6 +464,15 @@ def warning(named: Sequence[str], imitations: Sequence[str]) -> str:
 def _instead(verdict: Verdict) -> list[str]:
     best = {name: verdict.competing[name][0] for name in verdict.added if verdict.competing.get(name)}
     return [f"{c.name} instead of {name} leaves {c.misfit.rms_validation:.3g} × noise." for name, c in best.items()]
+
+
+def _recording_instead(result: SearchResult) -> list[str]:
+    """What may be wrong in the records, and in the data sheet with it, if nothing is missing."""
+    found = [f.text for f in result.faults_instead]
+    several = result.together_instead
+    if several.faults:
+        found.append(_and([*(f.text for f in several.faults), *(_deviation(result, d) for d in several.numbers)]))
+    return found
 
 
 def _numbers(result: SearchResult) -> list[str]:
