@@ -185,6 +185,8 @@ class Writer:
                     "drive_force", "moving_mass",
                 )),
                 f"land_gain = {p('valve_flow')} / math.sqrt({p('valve_drop')})",
+                "oil_compressibility = 1.0 / bulk_modulus",
+                "area_ratio = piston_area_b / piston_area_a",
                 "smallest_volume = 0.01 * min(dead_volume_a, dead_volume_b)",
             ]
         )  # fmt: skip

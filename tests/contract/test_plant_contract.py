@@ -28,7 +28,10 @@ PATIENT = ("-p", "watchdog:=2.0")
 PLANT = "/actuator/plant"
 
 
-@pytest.fixture(params=sorted(PLANTS))
+THOROUGH = "integrator"  # shares all but its few lines of physics with the others
+
+
+@pytest.fixture(params=[pytest.param(p, marks=pytest.mark.thorough) if p == THOROUGH else p for p in sorted(PLANTS)])
 def start(request: pytest.FixtureRequest, launch: Any, compiled_physics: None) -> Callable[..., Any]:
     """Starts the plant under test with further ROS arguments."""
     target, *arguments = PLANTS[request.param]
