@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from hydraulic_sim.compiled import compiled
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
+from hydraulic_sim.registry import library
 
 Array = np.ndarray
 
@@ -81,3 +83,15 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(bare: Model) -> None:
                                    - finest.velocity)))  # fmt: skip
 
     assert deviation(5e-4) / deviation(2.5e-4) == pytest.approx(16.0, rel=0.35)
+
+
+def test_what_relaxes_does_so_exponentially_within_a_step_and_to_the_end_beyond() -> None:
+    relax = compiled(library()).module.relax
+    z = np.concatenate((np.linspace(0.0, 0.5, 51), np.geomspace(0.6, 1e6, 200)))
+    left = np.array([relax(1.0, rate, 0.0, 1.0) for rate in z])
+    assert np.abs(left - np.exp(-z))[z <= 0.3].max() < 1e-7, "a step of 0.3 of its time"
+    assert np.abs(left - np.exp(-z)).max() < 0.0025
+    assert np.all(left > 0.0) and np.all(np.diff(left) < 0.0) and left[-1] < 1e-12
+    assert relax(2.0, 0.0, 5.0, 1.0) == 2.0
+    growing = np.array([relax(1.0, -rate, 0.0, 1.0) for rate in z[:51]])
+    assert np.all(growing >= 1.0), "a fit may try a time below 0"
