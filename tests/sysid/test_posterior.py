@@ -15,15 +15,10 @@ from hydraulic_sysid.diagnosis.search.data_sheet import Deviation
 from hydraulic_sysid.diagnosis.search.drift import Drift
 from hydraulic_sysid.diagnosis.search.holdout import Split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit
-from hydraulic_sysid.diagnosis.search.posterior import (
-    CALIBRATION,
-    explanations,
-    probability,
-    probability_of_unknown,
-    sentence,
-)
+from hydraulic_sysid.diagnosis.search.posterior import explanations, probability, sentence
 from hydraulic_sysid.diagnosis.search.remainder import Remainder
 from hydraulic_sysid.diagnosis.search.search_state import SearchResult, SearchState
+from hydraulic_sysid.diagnosis.search.unknown_law import CALIBRATION, probability_of_unknown
 from hydraulic_sysid.diagnosis.search.verdict import (
     COMPLETE,
     DATA_SHEET,

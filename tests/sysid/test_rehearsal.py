@@ -15,7 +15,7 @@ from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.rehearsal import rehearse
 from hydraulic_sysid.diagnosis.search.candidate_table import NOTHING, UNKNOWN, probabilities
 from hydraulic_sysid.diagnosis.search.misfit import Misfit
-from hydraulic_sysid.diagnosis.search.posterior import probability_of_unknown
+from hydraulic_sysid.diagnosis.search.unknown_law import probability_of_unknown
 from hydraulic_sysid.excitation import Plan, load_plan
 from hydraulic_sysid.verbs import rehearse as verb
 

@@ -8,9 +8,9 @@ from typing import Any
 from .candidates import subsystem
 from .competing_models import odds
 from .misfit import Misfit
-from .posterior import probability_of_unknown
 from .score_test import CandidateScore
 from .search_state import CandidateRefit, SearchState
+from .unknown_law import probability_of_unknown
 
 NOTHING = ""
 """The hypothesis that no candidate is missing."""

@@ -2,8 +2,8 @@
 
 Posterior odds are prior odds times a Bayes factor (Kass & Raftery, JASA 90 (1995) 773). The factor between two models
 is a power of the difference of their sums of squares, tempered by what no law is right to (`competing_models`), and the
-odds of an unknown law grow with what is left beyond the noise. `Calibration` has the constants, which were chosen on
-benches whose answers are known; how often such probabilities are right on others is measured (diagnosis-matrix.md).
+odds of an unknown law grow with what is left beyond the noise (`unknown_law`). How often such probabilities are right
+is measured (diagnosis-matrix.md).
 """
 
 from __future__ import annotations
@@ -12,35 +12,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .competing_models import ODDS
-from .misfit import Misfit
 from .remainder import immaterial
 from .search_state import SearchResult
-from .verdict import COMPLETE, DATA_SHEET, INDISTINGUISHABLE, OUTSIDE, RECORDING, UNDECIDED, Verdict, decisive_drift
+from .unknown_law import CALIBRATION, Calibration, probability_of_unknown
+from .verdict import (
+    COMPLETE,
+    DATA_SHEET,
+    INDISTINGUISHABLE,
+    MISSING,
+    OUTSIDE,
+    RECORDING,
+    UNDECIDED,
+    Verdict,
+    decisive_drift,
+)
 
 HIGH = 0.99  # nothing is said to be surer than this
 
 What = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 """Effects, numbers of the data sheet and faults of the recording."""
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """The constants of `probability_of_unknown`, chosen on 237 benches of the seeds 70001 to 77001.
-
-    With half or double of any of them the mean logarithm of the probability of what came true, −0.268, is no more than
-    0.02 lower.
-    """
-
-    odds: float = ODDS
-    """Of what the search found against a law that the library lacks, where nothing is left beyond the noise."""
-    missed: float = 0.01
-    """Mean square over noise that an estimate of the noise may miss; with it left beyond the noise an unknown law is
-    twice as probable."""
-    laws: float = 1e-3
-    """The same, of the mean square that was explained: no law is quite that of a bench."""
-
-
-CALIBRATION = Calibration()
 
 
 @dataclass(frozen=True)
@@ -74,6 +64,8 @@ def explanations(result: SearchResult, verdict: Verdict, calibration: Calibratio
         # Not by what is left alone: a drift, a law bent to its limits. What is said is no less probable than all else.
         by_drift = decisive_drift(result) is not None
         unknown = max(unknown, calibration.odds / (1.0 + calibration.odds) if by_drift else 0.5)
+    elif verdict.kind in (MISSING, INDISTINGUISHABLE):
+        unknown = min(unknown, 0.5)
     known = _known(result, verdict)
     share = (1.0 - unknown) / sum(weight for weight, _ in known.values())
     found = [
@@ -95,13 +87,6 @@ def sentence(found: Sequence[Explanation]) -> str:
         return ""
     shown = f"over {100.0 * HIGH:.0f} %" if said > HIGH else f"{100.0 * said:.0f} %"
     return f"The probability of this verdict is {shown}."
-
-
-def probability_of_unknown(before: Misfit, after: Misfit, calibration: Calibration = CALIBRATION) -> float:
-    """That the library lacks the law that is right, by what is left after most was explained."""
-    left, explained = after.variance - 1.0, max(before.variance - after.variance, 0.0)
-    odds = (1.0 + left / (calibration.missed + calibration.laws * explained)) / calibration.odds
-    return odds / (1.0 + odds)
 
 
 def _known(result: SearchResult, verdict: Verdict) -> dict[What, tuple[float, bool]]:

@@ -25,6 +25,7 @@ from .nonparametric_curves import NonparametricCurve
 from .remainder import NOTHING, Remainder, Spikes, immaterial
 from .search_state import SearchResult, Together
 from .set_aside import DIFFERENT, FAR_OFF, SATURATED, SetAside
+from .unknown_law import probability_of_unknown
 from .whiteness import Whiteness
 from .worth import FURTHER
 
@@ -143,7 +144,8 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
 
     Where effects explain the most and none of the ``curves`` a part of the rest, that is how far their laws are off
     those of the bench (the touch of a backlash, the start of a cushion): nothing else is missing. Where far more than
-    noise is left, and a curve explains the most of it, something else is.
+    noise is left, and a curve explains the most of it, something else is; so it is where a law that the library lacks
+    is more probable by what is left, unless it is known that none of the curves explains a part of that.
     """
     if result.stopped:
         return UNDECIDED
@@ -160,11 +162,14 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
         return OUTSIDE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
-    details = final.variance < SMALL or (bool(curves) and all(c.share < UNATTRIBUTED for c in curves))
+    no_law = bool(curves) and all(c.share < UNATTRIBUTED for c in curves)
+    details = final.variance < SMALL or no_law
     if final.usual > RIGHT and any(c.share > SHOWN for c in curves):
         return OUTSIDE
     allowed = SMALL_UNEXPLAINED if details else BESIDE
     if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
+        return OUTSIDE
+    if probability_of_unknown(result.before_laws, final) > 0.5 and not no_law:
         return OUTSIDE
     return INDISTINGUISHABLE if tied else MISSING
 
