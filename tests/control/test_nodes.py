@@ -220,6 +220,9 @@ def test_the_relay_experiment_through_the_topics(
     assert client.call("std_srvs/srv/SetBool", "/actuator/enable", data=True).success
     assert process.wait() == 0, process.output()
     found = json.loads(output.read_text())
+    wait_until(lambda: commands[-1].effort[0] == 0.0, "the last command, which is 0 V")
+    ended_ns = from_time(commands[-1].header.stamp)
+    wait_until(lambda: from_time(states[-1].header.stamp) > ended_ns, "a state after it")
 
     state_at = {from_time(message.header.stamp): message for message in list(states)}
     answered = [(from_time(message.header.stamp), message.effort[0]) for message in list(commands)]

@@ -49,7 +49,7 @@ def test_a_quick_look_at_a_part_of_the_records_finds_it_too(run: Path, tmp_path:
     assert diagnose_main(["--model", "sample_bench", "--record", str(RECORDS), "--quick", "--out", str(tmp_path)]) == 0
     whole, quick = (json.loads((folder / "diagnose.json").read_text()) for folder in (run, tmp_path))
     assert quick["verdict"]["effects"] == ["valve_deadband"]
-    assert quick["settings"]["values_used"] < 1.05 * QUICK_VALUES < whole["settings"]["values_used"]
+    assert quick["settings"]["values_used"] < 1.2 * QUICK_VALUES < whole["settings"]["values_used"]
     assert quick["settings"]["quick"] and not whole["settings"]["quick"]
     assert whole["balances"] and not quick["balances"], "what only confirms is left out"
     names = [{r["name"] for r in found["records"]} for found in (whole, quick)]
