@@ -44,6 +44,7 @@ def test_every_verb_takes_the_command_line_that_is_made_for_it(verb: str, files:
         "effect": "valve_deadband",
         "signal": "chirp",
         "within": 60,
+        "quick": True,
         "seconds": 20,
         "band": [0.1, 10.0],
         "seed": 2,

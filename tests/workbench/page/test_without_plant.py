@@ -103,6 +103,20 @@ def test_two_records_and_a_model_over_each_other(bench: Any, picture: Callable[.
     assert titles == ["multisine", "sample_bench on multisine", "moog_mcr_m_1002_bench on multisine"]
 
 
+def test_a_quick_look_is_what_is_asked_for(bench: Any, picture: Callable[..., None]) -> None:
+    page = bench.open(tab="diagnose")
+    page.check("#quick")
+    with page.expect_request("**/api/jobs") as asked:
+        page.click("#verb-diagnose")
+    assert asked.value.post_data_json["quick"] is True
+    page.wait_for_selector("#cancel-job")
+    picture(page, "diagnose-quick")
+    until(page, "workbench.state.jobs[0].phase === 'running'")
+    page.click("#cancel-job")
+    page.click("#cancel-job:not([disabled])")  # at once
+    until(page, "!['running', 'queued'].includes(workbench.state.jobs[0].phase)")
+
+
 def test_files_are_dropped_onto_the_page(bench: Any, tmp_path: Path) -> None:
     lines = gzip.decompress((SAMPLE / "steps.csv.gz").read_bytes()).decode().splitlines()[:2001]
     (tmp_path / "dropped.csv").write_text("\n".join(lines))

@@ -59,6 +59,7 @@ def _diagnose(asked: Asked) -> list[str]:
         *_model_and_records(asked, "--holdout"),
         "--apply",
         *(["--within", str(_number(within, "within"))] if within else []),
+        *(["--quick"] if asked.options.get("quick") else []),
     ]
 
 

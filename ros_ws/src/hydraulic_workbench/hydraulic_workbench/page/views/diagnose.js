@@ -5,7 +5,7 @@ import { cancelJob, modelOf, open, operates, runs } from "../core/actions.js";
 import { post } from "../core/api.js";
 import { attempt } from "../core/messages.js";
 import { clock, duration, words } from "../core/format.js";
-import { anyRuns, chosenRecords, documentOf, runVerb } from "./diagnosis_steps.js";
+import { anyRuns, chosenRecords, diagnose, documentOf, runVerb } from "./diagnosis_steps.js";
 import { falling } from "./falling.js";
 import { timeline } from "./timeline.js";
 import { diagnosisResult, runningCandidates } from "./diagnosis_result.js";
@@ -56,8 +56,10 @@ function setup() {
     ${recordsMenu(chosen)}${modelMenu()}
     <div class="row verbs">
       ${VERBS.map(([verb, text, title]) => html`<button id=${`verb-${verb}`} title=${title} ?disabled=${locked} @click=${() => runVerb(verb)}>${text}</button>`)}
+      <label class="check" title="A part of the records, and nothing that only confirms: sooner, but what is small is missed"><input type="checkbox" id="quick"
+        .checked=${state.quick} @change=${(event) => update({ quick: event.target.checked })}>Quick</label>
       <button class="primary" id="verb-diagnose" title="Try every effect of the library, and faults of the data" ?disabled=${locked || anyRuns()}
-        @click=${() => runVerb("diagnose")}>Diagnose</button></div>
+        @click=${diagnose}>Diagnose</button></div>
   </section>`;
 }
 

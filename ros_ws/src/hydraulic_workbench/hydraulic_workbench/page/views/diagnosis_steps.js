@@ -6,7 +6,7 @@ import { attempt, say } from "../core/messages.js";
 import { refresh } from "../core/connection.js";
 import { words } from "../core/format.js";
 
-Object.assign(state, { chosenRecords: null, shownJob: null });
+Object.assign(state, { chosenRecords: null, shownJob: null, quick: false });
 const documents = new Map(); // run → document, or null while it is fetched
 
 /** Records that a verb is given: what the user ticked, else the newest. */
@@ -49,8 +49,11 @@ async function finished(job) {
 export async function diagnoseRecord(record) {
   update({ chosenRecords: [record.id] });
   open("diagnose");
-  await runVerb("diagnose");
+  await diagnose();
 }
+
+/** Ask what the model lacks, with the records that are chosen. */
+export const diagnose = () => runVerb("diagnose", state.quick ? { quick: true } : {});
 
 /** The newest diagnosis that has a result, if the model is still the one it judged. */
 export function lastDiagnosis() {
