@@ -173,7 +173,7 @@ class Jobs:
         if done:
             await self._finished(job)
         job.phase = "finished" if done else "cancelled" if job.cancelled else "failed"
-        job.error = "" if done else log.words()
+        job.error = "" if done or job.cancelled else log.words()  # who cancels is not told where that struck
         job.progress = ""
         self._note(job)
         self._tell(job)
