@@ -106,8 +106,10 @@ def test_two_records_and_a_model_over_each_other(bench: Any, picture: Callable[.
 def test_a_quick_look_is_what_is_asked_for(bench: Any, picture: Callable[..., None]) -> None:
     page = bench.open(tab="diagnose")
     page.check("#quick")
+    page.evaluate("location.hash = '#/records'")
+    row = page.locator("table.records tr:has-text('steps')")  # long enough to be cancelled
     with page.expect_request("**/api/jobs") as asked:
-        page.click("#verb-diagnose")
+        row.get_by_role("button", name="Diagnose").click()
     assert asked.value.post_data_json["quick"] is True
     page.wait_for_selector("#cancel-job")
     picture(page, "diagnose-quick")
