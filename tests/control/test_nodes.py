@@ -215,8 +215,8 @@ def test_the_relay_experiment_through_the_topics(
     plant("enable_on_activate:=false")
     output, settings = tmp_path / "relay.json", RelaySettings()
     process = node("relay", f"output:={output}", "use_sim_time:=true", "state_timeout:=5.0")
-    wait_until(lambda: states and commands, "commands: from here on all are heard")
-    begun_ns = from_time(commands[-1].header.stamp)
+    wait_until(lambda: states and commands, "states and commands: from here on all are heard")
+    begun_ns = max(from_time(first.header.stamp) for first in (states[0], commands[-1]))  # the node may have heard more
     assert client.call("std_srvs/srv/SetBool", "/actuator/enable", data=True).success
     assert process.wait() == 0, process.output()
     found = json.loads(output.read_text())
