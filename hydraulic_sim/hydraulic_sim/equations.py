@@ -25,27 +25,18 @@ if hydraulic:
     {ripple}
     pressure_tank = tank_pressure
     {tank}
-    flow_pa = 0.0; flow_at = 0.0; flow_pb = 0.0; flow_bt = 0.0; slope_a = 0.0; slope_b = 0.0
-    opened = land_pa + valve_leakage  # a land that is shut has no root to be taken
-    if opened != 0.0:
-        drop = pressure_supply - pressure_a
-        gain = land_gain * opened * smooth_root_gain(drop, orifice_transition)
-        flow_pa = gain * drop; slope_a += gain
-    opened = land_at + valve_leakage
-    if opened != 0.0:
-        drop = pressure_a - pressure_tank
-        gain = land_gain * opened * smooth_root_gain(drop, orifice_transition)
-        flow_at = gain * drop; slope_a += gain
-    opened = land_pb + valve_leakage
-    if opened != 0.0:
-        drop = pressure_supply - pressure_b
-        gain = land_gain * opened * smooth_root_gain(drop, orifice_transition)
-        flow_pb = gain * drop; slope_b += gain
-    opened = land_bt + valve_leakage
-    if opened != 0.0:
-        drop = pressure_b - pressure_tank
-        gain = land_gain * opened * smooth_root_gain(drop, orifice_transition)
-        flow_bt = gain * drop; slope_b += gain
+    drop = pressure_supply - pressure_a
+    gain = orifice_gain(land_gain * (land_pa + valve_leakage), drop, orifice_transition)
+    flow_pa = gain * drop; slope_a = gain
+    drop = pressure_a - pressure_tank
+    gain = orifice_gain(land_gain * (land_at + valve_leakage), drop, orifice_transition)
+    flow_at = gain * drop; slope_a += gain
+    drop = pressure_supply - pressure_b
+    gain = orifice_gain(land_gain * (land_pb + valve_leakage), drop, orifice_transition)
+    flow_pb = gain * drop; slope_b = gain
+    drop = pressure_b - pressure_tank
+    gain = orifice_gain(land_gain * (land_bt + valve_leakage), drop, orifice_transition)
+    flow_bt = gain * drop; slope_b += gain
     flow_supply = flow_pa + flow_pb
     flow_tank = flow_at + flow_bt
     flow_a = flow_pa - flow_at
@@ -92,7 +83,7 @@ import math
 import numpy as np
 from numba import njit
 from hydraulic_sim.compiled import RUN
-from hydraulic_sim.kernels import clamp, smooth_root_gain
+from hydraulic_sim.kernels import clamp, orifice_gain
 
 {functions}
 

@@ -18,6 +18,12 @@ def smooth_root_gain(drop: float, transition: float) -> float:
 
 
 @njit(error_model="numpy")
+def orifice_gain(size: float, drop: float, transition: float) -> float:
+    """``size`` times `smooth_root_gain`: flow per drop. Of an orifice that is shut no root is taken."""
+    return size * smooth_root_gain(drop, transition) if size != 0.0 else 0.0
+
+
+@njit(error_model="numpy")
 def clamp(value: float, low: float, high: float) -> float:
     """``value`` kept within low…high."""
     return min(max(value, low), high)

@@ -58,8 +58,9 @@ class CandidateFits(Fitting):
         sensitivities alone often falls far short of what a fit gains (47 of 980, for a little air in the oil), so no
         more is asked than would count at all. A quick search leaves that out.
         """
-        if state.misfit.variance - 1.0 >= NOTHING_LEFT or self.quick:
-            return state.misfit.variance - 1.0 < NOTHING_LEFT
+        nothing = state.misfit.variance - 1.0 < NOTHING_LEFT
+        if self.quick or not nothing:
+            return nothing
         self.say("looking for what may pass for noise")
         return not any(s.reduction > state.misfit.least and not observed(s.effect) for s in self.scores(state))
 
