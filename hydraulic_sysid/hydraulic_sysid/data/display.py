@@ -92,6 +92,13 @@ def quantity(value: float | None, unit: str, digits: int = 3, power: int = 1, er
     return f"{number(value * scale**power, digits)}{spread} {name}"
 
 
+def resolving(value: float, error: float) -> int:
+    """Significant digits of a value that show two digits of its error: 3 to 6."""
+    if not (math.isfinite(error) and error > 0.0 and value):
+        return 4
+    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2, 3), 6)
+
+
 def span(low: float, high: float, unit: str) -> str:
     """Two numbers with one unit: ``−546 … 579 mm``."""
     scale, name = shown(unit)

@@ -5,10 +5,10 @@ error of the two counts. What a record says of a parameter depends on its experi
 quite the true one; the scatter between records then holds that too. What all records share of that they cannot show: no
 law of a library is that of a bench to the last per cent, and an interval is never narrower (a model discrepancy in the
 sense of Kennedy & O'Hagan, J. R. Statist. Soc. B 63 (2001), as a fixed share). The laws of effects are the rougher
-ones, and what shapes them is the roughest. With these shares 89 of 94 intervals of benches with other laws covered the
-truth, and 71 of 77 that they were not chosen on. Numbers of the data sheet that a fit holds
-are not exact either: what they may be off within their tolerance moves the parameters, and is in the errors (their
-covariance with all of them free under their priors, less that of the fit).
+ones, and what shapes them is the roughest; numbers of a data sheet are of gauges and drawings, not of laws. With these
+shares 89 of 94 intervals of benches with other laws covered the truth, and 71 of 77 that they were not chosen on.
+Numbers of the data sheet that a fit holds are not exact either: what they may be off within their tolerance moves the
+parameters, and is in the errors (their covariance with all of them free under their priors, less that of the fit).
 """
 
 from __future__ import annotations
@@ -79,9 +79,9 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
 
 
 def _share(model: Model, key: str) -> float:
-    """Standard error of a parameter for the law that it stands in, of its value."""
+    """Standard error of a parameter for the law that it stands in, of its value; gauges and drawings tell of no law."""
     if "." not in key:
-        return _LAW
+        return _LAW if model.parameter(key).free else 0.0
     return _SHAPE if model.parameter(key).null is None else _EFFECT
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hydraulic_sim.effect import Effect
 from hydraulic_sim.model import Model
-from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity
+from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity, resolving
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.records.paired import partner_of
 from hydraulic_sysid.estimation.noise_model import SPIKY
@@ -46,7 +46,7 @@ MUCH = 4.0  # … and from which on it is not what is wrong, …
 BLAMED = 0.5  # … nor where more than this share of what was to be explained is left
 UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
 BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to 15 %
-UNATTRIBUTED = 0.1  # of what is left: a curve that explains less of it shows no law that is missing
+UNATTRIBUTED = 0.125  # of what is left: a curve that explains less of it shows no law that is missing
 SHOWN = 0.5  # of what is left: a curve that explains more of it is a law that is missing, where more than …
 RIGHT = 9.0  # … this mean square over noise is left: the laws of effects rightly named left 7.2 at most
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
@@ -377,10 +377,11 @@ def data_sheet_sentences(result: SearchResult) -> list[str]:
 
 def _deviation(result: SearchResult, d: Deviation) -> str:
     unit, entry = result.model.parameter(d.key).unit, result.model.entry(d.key)
-    nominal = quantity(d.nominal, unit)
+    digits = resolving(d.value, d.standard_error)
+    nominal = quantity(d.nominal, unit, digits)
     at_bound = entry.free and entry.bounds is not None
     said = f"beyond its bound of {nominal}" if at_bound else f"not the {nominal} of the model file"
-    return f"{d.key} is {quantity(d.value, unit, 4, error=d.standard_error)}, {said}"
+    return f"{d.key} is {quantity(d.value, unit, digits, error=d.standard_error)}, {said}"
 
 
 def recording_sentences(result: SearchResult) -> list[str]:
