@@ -31,7 +31,6 @@ NAMED = ("piston_area_a", "piston_area_b", "dead_volume_a", "dead_volume_b", "su
 SIGNIFICANT = 25.0  # reduction of the sum of squares, of the variance, for which a number is named …
 PLAUSIBLE = 3.0  # times an effect's default size: a standard deviation of its size
 ROUGH = 0.02  # of what numbers explain: what a prediction that far may be off
-SURE = 2.0  # standard errors by which a number must be off to be named
 VISIBLE = 0.01  # … at least this share of the number of residuals
 
 
@@ -49,11 +48,6 @@ class Deviation:
     cost: float
     instead: tuple[str, ...] = ()
     alternatives: tuple[Deviation, ...] = ()
-
-    @property
-    def sure(self) -> bool:
-        """Whether it is another number than that of the model file, beyond its error."""
-        return abs(self.value - self.nominal) > SURE * self.standard_error
 
 
 def with_error(deviation: Deviation, known: Mapping[str, Known]) -> Deviation:
