@@ -536,11 +536,6 @@ def test_a_small_remainder_does_not_take_back_what_is_said_of_the_recording(mode
     assert "dead_volume_a" not in verdict.sentences(much, verdict.judge(much), []), "bent to what is not known"
 
 
-def test_a_number_is_named_if_it_is_off_by_more_than_its_error() -> None:
-    assert not Deviation("dead_volume_a", 200e-6, 202e-6, 2.1e-6, 2000.0).sure
-    assert Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0).sure
-
-
 def test_a_fault_of_the_recording_that_explains_the_same_is_named_beside_the_effect(model) -> None:
     gain = next(h for h in HYPOTHESES if h.name == "pressure_a_gain")
     base, final = state(model, 3000 * 4.0, {}), state(model.with_effect("pressure_offset"), 3000.0, {})
@@ -633,7 +628,7 @@ def test_fewer_numbers_come_first_where_the_quadratic_may_be_wrong() -> None:
 def test_a_number_at_its_bound_has_the_error_that_it_has_beside_the_others() -> None:
     found = held_numbers([30.0, 1.0]).deviation("a", ["a"], 30.0)
     assert (found.key, found.nominal, found.value, found.standard_error) == ("a", 0.0, 30.0, 1.0)
-    assert found.cost == pytest.approx(900.0) and found.sure
+    assert found.cost == pytest.approx(900.0)
 
 
 def test_of_numbers_that_say_the_same_either_may_move() -> None:
@@ -653,6 +648,10 @@ def test_numbers_that_explain_the_same_are_all_named(model) -> None:
     assert verdict.data_sheet_sentences(found) == [
         "piston_area_a is 30.9 ± 0.1 cm², not the 31.2 cm² of the model file, "
         "or piston_area_b is 21.2 ± 0.1 cm², not the 21 cm² of the model file: these data cannot distinguish them."
+    ]
+    sharp = replace(other, value=2.1004e-3, standard_error=2.6e-8)
+    assert verdict.data_sheet_sentences(replace(found, moved=[sharp])) == [
+        "piston_area_b is 21.004 ± 0.00026 cm², not the 21 cm² of the model file."
     ]
 
 

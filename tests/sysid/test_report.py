@@ -16,6 +16,7 @@ from hydraulic_node_utils.whole_file import write_text
 from hydraulic_sim.model_file import load_model
 from hydraulic_sysid import report
 from hydraulic_sysid.data import results
+from hydraulic_sysid.data.display import quantity
 from hydraulic_sysid.data.records import read_all
 from hydraulic_sysid.diagnosis.compare import ModelSubject, compare
 from hydraulic_sysid.linear.identification import identify
@@ -220,3 +221,16 @@ def test_folder_without_results_says_what_to_do(tmp_path: Path) -> None:
         results.read_folder(tmp_path)
     with pytest.raises(results.ResultError, match="does not exist"):
         results.read_folder(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "error", "said"),
+    [
+        (13945089.4, "Pa", 650.0, "139.451 ± 0.0065 bar"),
+        (0.0123456, "m", 2.5e-3, "12.3 ± 2.5 mm"),
+        (0.0123456, "m", 1.0, "12 ± 1000 mm"),
+        (0.0, "m", 1e-3, "0 ± 1 mm"),
+    ],
+)
+def test_a_value_has_as_many_digits_as_its_error_leaves(value: float, unit: str, error: float, said: str) -> None:
+    assert quantity(value, unit, error=error) == said

@@ -80,6 +80,7 @@ def number(value: float | None, digits: int = 3) -> str:
 def quantity(value: float | None, unit: str, digits: int = 3, power: int = 1, error: float | None = None) -> str:
     """A number with the unit that users of such benches read: 0.0123 m → ``12.3 mm``; a dash for no number.
 
+    :param digits: significant ones; with an error those that show two digits of it (`resolving`)
     :param power: of the unit, 2 for mean squares
     :param error: standard error, after ±
     """
@@ -88,15 +89,17 @@ def quantity(value: float | None, unit: str, digits: int = 3, power: int = 1, er
     scale, name = (1e3, "ms") if unit == "s" and 0.0 < abs(value) < _SHORT else shown(unit)
     if power == 2:
         name = f"({name})²" if "/" in name else f"{name}²"
+    if error is not None:
+        digits = resolving(value, error)
     spread = "" if error is None else f" ± {number(error * scale, 2)}"
     return f"{number(value * scale**power, digits)}{spread} {name}"
 
 
-def resolving(value: float, error: float) -> int:
-    """Significant digits of a value that show two digits of its error: 3 to 6."""
-    if not (math.isfinite(error) and error > 0.0 and value):
+def resolving(value: float | None, error: float | None) -> int:
+    """Significant digits of a value that show two digits of its error: 2 to 6; 4 where either is unknown or 0."""
+    if not (value and error and math.isfinite(value) and math.isfinite(error) and error > 0.0):
         return 4
-    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2, 3), 6)
+    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2, 2), 6)
 
 
 def span(low: float, high: float, unit: str) -> str:

@@ -33,6 +33,7 @@ FILTERS: dict[str, Callable[..., Any]] = {
     "number": _whole(display.number),
     "percent": _whole(display.percent),
     "quantity": _whole(display.quantity),
+    "resolving": display.resolving,
     "shell": lambda text: shlex.quote(str(text)),
     "shown": display.shown,
     "span": _whole(display.span),

@@ -223,7 +223,7 @@ class Search(RecordingFits):
         final, competing = path[-1], {added[-1]: path[-2]} if added and known is None else {}
         misfits = {name: state.misfit for name, state in zip(added, path[1:], strict=False)}
         if len(added) > 1 or known is not None:
-            final, kept, competing = self._reviewed(base, final, added, competing)
+            final, kept, competing = self.reviewed(base, final, added, competing)
             if kept != added or len(misfits) < len(kept):
                 misfits = self._misfits(base, final, kept, competing)
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
@@ -255,7 +255,7 @@ class Search(RecordingFits):
         found = self.concluded(found, others=False)
         return accidents_named(self.with_force(found, base.model, scores) if judged_by_force(base) else found)
 
-    def _reviewed(
+    def reviewed(
         self, base: SearchState, state: SearchState, added: list[str], competing: dict[str, SearchState]
     ) -> tuple[SearchState, list[str], dict[str, SearchState]]:
         """Leave out what the others make superfluous; put in an effect's place what fits better there.
@@ -283,10 +283,11 @@ class Search(RecordingFits):
             without = self.explore(without, most=LATER_REFITS, anew=False)
             competing = {**competing, name: without}
             # Added last, it may lead on from where the fit had stopped.
-            own = [r for r in without.refits if r.name == name and r.misfit.total < state.misfit.total]
-            again = self.finish(replace(without, refits=own), anything)
-            if again is not None and again.misfit.total < state.misfit.total:
-                state = again
+            for own in (r for r in without.refits if r.name == name and r.misfit.total < state.misfit.total):
+                self.say(f"fitting with {name}")
+                with suppress(SimulationError):
+                    again = self.begun_anew(self.state(own.refit.model, self._last))
+                    state = min(state, again, key=lambda s: s.misfit.total)
             near = near_competitors(base, without, state, name)
             other = self.finish(near, anything) if swaps < MOST_SWAPS else None
             if other is not None and self.with_freedom(state) - self.with_freedom(other) > state.misfit.least:

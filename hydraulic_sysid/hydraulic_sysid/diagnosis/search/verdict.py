@@ -327,7 +327,7 @@ def drift_sentences(result: SearchResult) -> list[str]:
 
 def _changes(result: SearchResult, d: Drift) -> str:
     unit, sign = result.model.parameter(d.key).unit, "+" if d.change > 0.0 else ""
-    by = f"{sign}{quantity(d.change, unit, 2, error=d.standard_error)}"
+    by = f"{sign}{quantity(d.change, unit, error=d.standard_error)}"
     mean = quantity(d.value, unit, 3)
     return f"{d.key} changes along the records, by {by} from beginning to end ({mean} in the mean)"
 
@@ -377,11 +377,10 @@ def data_sheet_sentences(result: SearchResult) -> list[str]:
 
 def _deviation(result: SearchResult, d: Deviation) -> str:
     unit, entry = result.model.parameter(d.key).unit, result.model.entry(d.key)
-    digits = resolving(d.value, d.standard_error)
-    nominal = quantity(d.nominal, unit, digits)
+    nominal = quantity(d.nominal, unit, resolving(d.value, d.standard_error))
     at_bound = entry.free and entry.bounds is not None
     said = f"beyond its bound of {nominal}" if at_bound else f"not the {nominal} of the model file"
-    return f"{d.key} is {quantity(d.value, unit, digits, error=d.standard_error)}, {said}"
+    return f"{d.key} is {quantity(d.value, unit, error=d.standard_error)}, {said}"
 
 
 def recording_sentences(result: SearchResult) -> list[str]:
