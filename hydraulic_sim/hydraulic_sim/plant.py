@@ -97,6 +97,13 @@ class Plant:
                 model = model.with_values({key: enough})
         return cls(model, FIT_STEP, FIT_REFINEMENT)
 
+    @property
+    def fastest(self) -> tuple[str, float, float]:
+        """What asks for the shortest steps away from the stops: an effect or ``oil``, its rate [1/s], the step [s]."""
+        causes = rates.by_cause(self._but_stops, self._values(), self.model.kind)
+        cause = max(causes, key=lambda name: causes[name], default="")
+        return cause, causes.get(cause, 0.0), self._clear_step
+
     def held(self) -> Plant:
         """This plant with a piston so heavy that no force moves it within a few samples: it goes where it was seen."""
         other = self.with_parameters({"moving_mass": HEAVY * self.value("moving_mass")})

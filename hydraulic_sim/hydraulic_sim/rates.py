@@ -12,15 +12,20 @@ STEP_TIMES_LANDS = 1.2  # and of the rate of the oil through the lands, which da
 
 
 def fastest(effects: Iterable[Effect], values: Mapping[str, float], kind: str) -> float:
-    """The fastest rate [1/s] that the effects state for parameter ``values`` (by key), and that of the oil.
+    """The fastest rate [1/s] that the effects state for parameter ``values`` (by key), and that of the oil."""
+    return max(by_cause(effects, values, kind).values(), default=0.0)
+
+
+def by_cause(effects: Iterable[Effect], values: Mapping[str, float], kind: str) -> dict[str, float]:
+    """The rate [1/s] that each effect states, by its name, and that of the ``oil`` of a hydraulic plant.
 
     A fit may try values beyond the bounds: the root of a negative stiffness is a rate of growth.
     """
-    rate = oil(values) if kind == "hydraulic" else 0.0
+    found = {"oil": oil(values)} if kind == "hydraulic" else {}
     for effect in effects:
         if effect.step_rate is not None:
-            rate = max(rate, abs(effect.step_rate({**values, **_own(effect, values)})))
-    return rate
+            found[effect.name] = abs(effect.step_rate({**values, **_own(effect, values)}))
+    return found
 
 
 def step(rate: float, longest: float, refinement: float = 1.0) -> float:

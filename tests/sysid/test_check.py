@@ -14,7 +14,7 @@ from hostile_page import assert_cannot_inject
 from hidden_effects import axis, benches
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model, save_model
-from hydraulic_sim.plant import Plant
+from hydraulic_sim.plant import FIT_REFINEMENT, Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.calibrate import CalibrationError
@@ -264,6 +264,16 @@ def test_sampling_that_cannot_see_the_resonance(model: Model, records: list[Reco
         said = {f.kind: f.severity for f in contradictions(model, slow)}
         assert said.get("sampling") == severity
         assert "contradiction" not in said.values()
+
+
+def test_what_asks_for_many_steps_is_named(model: Model, records: list[Record]) -> None:
+    """Dry friction that turns within micrometres on a mass of grams: a user who waits for a fit learns why."""
+    assert "steps" not in {kind for kind, _ in judged(model, records)}
+    light = model.with_values({"moving_mass": 0.5}).with_values({"coulomb_friction.level": 900.0})
+    said = found(light, records, "steps")
+    assert (said.subject, said.severity) == ("coulomb_friction", "note")
+    assert said.measured == pytest.approx(DT * 7.2e5 / (0.6 * FIT_REFINEMENT), rel=1e-6)
+    assert "coulomb_friction at 720000 1/s" in said.text and "bristle_length (0.005 mm)" in said.remedy
 
 
 def test_what_the_reader_assumed_is_a_note(model: Model, records: list[Record]) -> None:

@@ -79,6 +79,7 @@ def contradictions(model: Model, records: Sequence[Record]) -> list[Finding]:
     frequency = experiment.resonance(model)
     every = [Observed.of(record, plant, frequency) for record in records]
     found = experiment.too_short(every) + experiment.little_drive(every) + experiment.slow_sampling(every)
+    found += experiment.small_steps(every)
     found += [f for seen in every for one in _OF_CHANNELS for f in one(seen)]
     units = wrong_units(every)
     if units:  # what follows from a channel of the wrong size says nothing new

@@ -9,6 +9,7 @@ import numpy as np
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.linear import poles
 from hydraulic_sim.model import Model
+from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import percent, quantity
 
 from .finding import DOUBTFUL, NOT_IDENTIFIABLE, NOTE, Finding
@@ -17,6 +18,7 @@ from .observed import ROUGH, Observed
 _SHORTEST = 4.5  # s of all records: nine segments of half a second, three blocks of which one is for validation
 _STANDS = 0.8  # share of the time at rest from which the records are mostly noise
 _LITTLE = 0.01  # of the drive's limit: a smaller standard deviation stays within dead band and null of any valve
+_MANY = 10.0  # steps of the integrator from sample to sample, from which a search takes long
 _PER_PERIOD = 2.5  # samples of the resonance's period below which it lies beyond what sampling shows
 
 
@@ -73,6 +75,30 @@ def _slow(seen: Observed, frequency: float) -> Finding:
         "Hz",
         seen.named,
     )
+
+
+def small_steps(records: Sequence[Observed]) -> list[Finding]:
+    """The integrator needs many steps from sample to sample, for what is far faster than the records."""
+    if not records:
+        return []
+    model = records[0].plant.model
+    cause, rate, step = Plant.for_fits(model).fastest
+    seen = max(records, key=lambda s: s.record.dt)
+    steps = seen.record.dt / step
+    if steps <= _MANY:
+        return []
+    mass = quantity(model.value("moving_mass"), "kg")
+    if cause == "oil":
+        remedy = f"Look at moving_mass ({mass}) and the dead volumes."
+    else:
+        length = quantity(model.value("bristle_length"), "m")
+        remedy = f"Look at moving_mass ({mass}) and at {cause}; dry friction turns within bristle_length "
+        remedy += f"({length}), which may be as long as what the position sensor resolves."
+    text = (
+        f"A simulation takes {steps:.0f} steps from sample to sample, for {cause} at {quantity(rate, '1/s')}: "
+        "every verb that fits takes as many times longer."
+    )
+    return [Finding("steps", cause, NOTE, text, remedy, steps, _MANY, "1", _names(records))]
 
 
 def resonance(model: Model) -> float | None:
