@@ -328,6 +328,28 @@ def test_beside_an_effect_a_change_that_is_small_or_explains_little_is_a_detail(
 
 
 @pytest.mark.parametrize(
+    ("best", "own", "place"),
+    [
+        (0.98, 0.67, "sensor"),  # its zero drifts, which friction follows as far as it can
+        (0.98, 0.95, "force"),  # either may be
+        (0.4, 0.1, "force"),  # the curves know little
+    ],
+)
+def test_what_drifts_is_where_a_curve_explains_it_better(model, best: float, own: float, place: str) -> None:
+    base = state(model, 6000.0, {})
+    drift = Drift("coulomb_friction.level", 450.0, 135.0, 2.0, 0.3, 2000.0)
+    found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {}, drift=drift)
+    curves = [
+        SimpleNamespace(summary="an error of the position sensor", subsystem="sensor", variable="time", share=best),
+        SimpleNamespace(summary="dry friction", subsystem="force", variable="time", share=own),
+    ]
+    judged = verdict.judge(found)
+    assert judged.kind == verdict.OUTSIDE and verdict.place(found, judged, curves) == place
+    looks = "It looks more like an error of the position sensor over time, which would explain 98 % of it."
+    assert (looks in verdict.sentences(found, judged, curves)) == (place == "sensor")
+
+
+@pytest.mark.parametrize(
     ("damping", "tied", "kind"),
     [
         (0.2, False, verdict.MISSING),

@@ -25,7 +25,6 @@ from .worst_segments import worst_segments
 
 _NEAREST = 3
 MOST_PLACES = 50  # of spikes in a channel that are listed
-_CLEAR = 0.5  # share of what is left, from which a curve says where it is
 
 
 def document(
@@ -174,12 +173,12 @@ def with_balances(
     """The document with balances.
 
     :param suspected: subsystems by what they explain of them, the most first; it says where something outside the
-        library is, unless a curve explains most of that
+        library is, unless a curve explains a part of that
     """
     later = {b["name"]: b["ratio"] for b in after}
     keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
     rows = [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]
-    clear = any(c["explained_share"] > _CLEAR for c in whole["nonparametric_curves"][:1])
+    clear = any(c["explained_share"] > verdicts.UNATTRIBUTED for c in whole["nonparametric_curves"][:1])
     where = suspected[0] if suspected and not clear else whole["verdict"]["subsystem"]
     return {**whole, "balances": rows, "verdict": {**whole["verdict"], "subsystem": where}}
 

@@ -49,6 +49,7 @@ BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to
 UNATTRIBUTED = 0.125  # of what is left: a curve that explains less of it shows no law that is missing
 SHOWN = 0.5  # of what is left: a curve that explains more of it is a law that is missing, where more than …
 RIGHT = 9.0  # … this mean square over noise is left: the laws of effects rightly named left 7.2 at most
+LIKE = 0.9  # of what the best curve explains, from which another one tells as well where it is
 SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
 IN_LINE = ("valve", "sensor")  # subsystems that a signal passes on its way from the command to what is read
 BELOW = 0.9  # residual over noise below which the noise model is doubted
@@ -233,12 +234,24 @@ def strained(result: SearchResult) -> bool:
 
 def place(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str | None:
     """The subsystem of the first effect added, or of the curve that explains most of what no effect does."""
-    drifting = drifting_effect(result)
-    if verdict.kind == OUTSIDE and drifting is not None:
-        return subsystem(result.model.library[drifting])
     if verdict.kind == OUTSIDE:
+        drifting = drifting_effect(result)
+        if drifting is not None and elsewhere(result, curves) is None:
+            return subsystem(result.model.library[drifting])
         return curves[0].subsystem if curves else None
     return subsystem(result.model.library[result.added[0]]) if result.added else None
+
+
+def elsewhere(result: SearchResult, curves: Sequence[NonparametricCurve]) -> NonparametricCurve | None:
+    """The curve that explains the most of what is left, where none does nearly as well at the effect that drifts.
+
+    What drifts elsewhere may be followed by a parameter of the model: the zero of a sensor by that of a valve.
+    """
+    drifting = drifting_effect(result)
+    if drifting is None or not curves or curves[0].share < SHOWN:
+        return None
+    own = subsystem(result.model.library[drifting])
+    return None if any(c.subsystem == own and c.share > LIKE * curves[0].share for c in curves) else curves[0]
 
 
 def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
@@ -290,10 +303,11 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         text += f"The nearest is {_and(result.added)}. {fell} "
     else:
         text += f"On validation data the residual is {final:.3g} × noise. "
-    if curves and drift is None:
-        best = curves[0]
+    best = curves[0] if curves and drift is None else elsewhere(result, curves)
+    if best is not None:
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
-        looks = f"It looks like {over}, which would explain {100 * best.share:.0f} % of it."
+        more = "" if drift is None else " more"
+        looks = f"It looks{more} like {over}, which would explain {100 * best.share:.0f} % of it."
         nothing = f"No curve at any place of the plant would explain {100 * UNATTRIBUTED:.0f} % of it."
         text += looks if best.share > UNATTRIBUTED else nothing
     # Not what the numbers of the data sheet were bent to: they imitate what no effect explains.
