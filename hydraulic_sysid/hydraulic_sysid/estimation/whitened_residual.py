@@ -61,11 +61,12 @@ def _whiten(values: Array, width: int, coefficients: Array, head: Array, found: 
     """One segment (n·width,) of samples that are ``width`` values side by side, as in `whitened`."""
     order = coefficients.size - 1
     begin = order * width
-    for i in range(begin, values.size):
-        found[i] = coefficients[0] * values[i]
-    for lag in range(1, order + 1):
-        for i in range(begin, values.size):
-            found[i] += coefficients[lag] * values[i - lag * width]
+    after = found[begin:]
+    after[:] = 0.0
+    for lag in range(order + 1):
+        factor, earlier = coefficients[lag], values[begin - lag * width : values.size - lag * width]
+        for i in range(after.size):  # counted from 0 in both, so that the processor takes several at once
+            after[i] += factor * earlier[i]
     for k in range(order):
         for w in range(width):
             total = 0.0
@@ -120,13 +121,17 @@ def residual(
     values, white = np.empty(n), np.empty(n)
     for s in range(segments):
         for c in range(channels):
-            for i in range(n):
-                values[i] = run[s, i, c]
+            values[:] = run[s, :, c]
             _record(values, delays[c], lags[c], white)
+            seen, gain, out = measured[s, :, c], gains[c], dropped[s, :, c]
             for i in range(n):
-                values[i] = 0.0 if dropped[s, i, c] else measured[s, i, c] - gains[c] * values[i]
+                values[i] = seen[i] - gain * values[i]
+            for i in range(n):
+                if out[i]:
+                    values[i] = 0.0
             order = orders[c]
             _whiten(values, 1, coefficients[c, : order + 1], heads[c], white)
+            scale, left = 1.0 / loudness[s, c], found[s, c::channels]
             for i in range(n):
-                found[s, i * channels + c] = white[i] / loudness[s, c]
+                left[i] = scale * white[i]
     return found
