@@ -109,7 +109,8 @@ def diagnose(
         proxy = explained(found.base.misfit, found.final.misfit) < HOPELESS
         suspect = found.base if proxy else found.final
         curves: list[NonparametricCurve] = []
-        if outside or (found.added and found.final.misfit.usual > verdicts.RIGHT and not found.by_force):
+        much = found.final.misfit.usual > verdicts.RIGHT and not (found.by_force or found.stopped)
+        if outside or (found.added and much):
             curves = nonparametric_curves(suspect.linearisation, say)
             verdict = verdicts.reviewed(verdict, found, curves)
             outside = verdict.kind == verdicts.OUTSIDE
