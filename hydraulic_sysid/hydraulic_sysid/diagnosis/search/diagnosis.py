@@ -131,7 +131,9 @@ def diagnose(
         if verdict.kind == verdicts.INDISTINGUISHABLE and tied:
             competing["+".join(tied)] = done
         before, after = found.base.model, found.final.model if found.added or found.moved else None
-        asked = outside and verdicts.drifting_effect(found) is None  # which says by itself where it is
+        # A change along the records and a curve that shows a law say by themselves where it is.
+        shown = verdicts.drifting_effect(found) is not None or any(c.share > verdicts.UNATTRIBUTED for c in curves)
+        asked = outside and not shown
         suspected = None if not asked else before if proxy else after
         del found, suspect  # their sensitivities would take up the memory that the balances need
         if quick and suspected is None:

@@ -172,14 +172,13 @@ def with_balances(
 ) -> dict[str, Any]:
     """The document with balances.
 
-    :param suspected: subsystems by what they explain of them, the most first; it says where something outside the
-        library is, unless a curve explains a part of that
+    :param suspected: subsystems by what they explain of them, the most first, where that says where something
+        outside the library is
     """
     later = {b["name"]: b["ratio"] for b in after}
     keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
     rows = [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]
-    clear = any(c["explained_share"] > verdicts.UNATTRIBUTED for c in whole["nonparametric_curves"][:1])
-    where = suspected[0] if suspected and not clear else whole["verdict"]["subsystem"]
+    where = suspected[0] if suspected else whole["verdict"]["subsystem"]
     return {**whole, "balances": rows, "verdict": {**whole["verdict"], "subsystem": where}}
 
 
