@@ -13,7 +13,6 @@ from measured.study import StudyError, data_folder
 STUDIES = measured_studies.studies()
 SHIPPED = sorted(name for name, study in STUDIES.items() if study.EXCERPT is not None)
 MOST = 1_000_000  # bytes of an excerpt
-LONG = ("bam", "mts")  # studies that take long
 
 
 def test_the_shipped_sets_are_these() -> None:
@@ -27,9 +26,7 @@ def test_a_shipped_excerpt_is_small_and_says_whose_it_is(name: str) -> None:
     assert {"LICENSE", "README.md"} <= {path.name for path in files}
 
 
-@pytest.fixture(
-    scope="module", params=[pytest.param(n, marks=pytest.mark.thorough) if n in LONG else n for n in SHIPPED]
-)
+@pytest.fixture(scope="module", params=SHIPPED)
 def studied(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path, int]:
     """Name of a set, the folder of the results, and the exit code of the command."""
     out = tmp_path_factory.mktemp(request.param)
