@@ -152,7 +152,7 @@ class DataSheetFits(CandidateFits):
                 break
         for key in moved:
             # Another number may say the same, or what a fit gained came from the others, which had stopped short.
-            if self.deviation(held, key, moved, done).cost < CLEAR * enough:
+            if held.deviation(key, moved, done.model.value(key)).cost < CLEAR * enough:
                 others = tuple(k for k in moved if k != key)
                 back = self.with_moved(done, others)
                 if back.misfit.total - done.misfit.total <= enough:
