@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import uuid
@@ -31,7 +32,8 @@ def test_one_claim_per_name() -> None:
 def test_a_killed_process_leaves_no_claim_behind() -> None:
     name = uuid.uuid4().hex
     command = [sys.executable, "-c", HOLD, name]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=env) as other:
         assert other.stdout is not None and other.stdout.readline().strip() == "True"
         assert not NameClaim(name).take()
         other.kill()
