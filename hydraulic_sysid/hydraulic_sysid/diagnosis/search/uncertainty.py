@@ -80,9 +80,10 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
 
 def _share(model: Model, key: str) -> float:
     """Standard error of a parameter for the law that it stands in, of its value; gauges and drawings tell of no law."""
+    record = model.parameter(key)
     if "." not in key:
-        return _LAW if model.parameter(key).free else 0.0
-    return _SHAPE if model.parameter(key).null is None else _EFFECT
+        return _LAW if record.free or record.nuisance else 0.0
+    return _SHAPE if record.null is None else _EFFECT
 
 
 def _of_held(at: Linearisation, free: Index, bread: Array, tolerances: Mapping[str, float]) -> Array:
