@@ -18,7 +18,7 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.data.records import Record, read_records
+from hydraulic_sysid.data.records import Record, read_all, read_records
 from hydraulic_sysid.diagnosis.calibrate import calibrate
 from hydraulic_sysid.estimation.fit import FitSettings
 from measured.study import DATA, MODELS, Check, Row, Source, StudyError, Work, free_run, rms, said
@@ -64,7 +64,11 @@ def study(data: Path, work: Work) -> list[Row]:
     """Machine and damper; quickly, the machine alone, in a shorter window."""
     wanted = [one for one in (machine, damper) if work.wanted(one.__name__, quick="machine")]
     if damper in wanted and not any(data.rglob(f"{DAMPER_FIT[0]}.txt")):
-        raise StudyError(f"{data}: no {DAMPER_FIT[0]}.txt in it: the excerpt is of --machine machine alone")
+        lacking = f"{data}: no {DAMPER_FIT[0]}.txt in it: the damper is not studied (the excerpt is of the machine)"
+        wanted.remove(damper)
+        if not wanted:
+            raise StudyError(lacking)
+        work.say(lacking)
     return [one(data, work) for one in wanted]
 
 
@@ -113,24 +117,22 @@ def _lag(model: Model) -> float:
 
 def damper(data: Path, work: Work) -> Row:
     """The MR damper by the force that moves it."""
-    files = {name: next(data.rglob(f"{name}.txt")) for name in (*DAMPER_FIT, *DAMPER_TEST)}
-    words = ["--model", MODELS / "mr_damper.yaml", "--record", *(files[name] for name in DAMPER_FIT),
-             "--columns", DAMPER_COLUMNS, "--segment", DAMPER_SEGMENT]  # fmt: skip
+    path = MODELS / "mr_damper.yaml"
+    to_fit, to_test = ([next(data.rglob(f"{name}.txt")) for name in names] for names in (DAMPER_FIT, DAMPER_TEST))
+    fit, tests = (read_all(files, DAMPER_COLUMNS) for files in (to_fit, to_test))
+    words = ["--model", path, "--record", *to_fit, "--columns", DAMPER_COLUMNS, "--segment", DAMPER_SEGMENT]
     found = work.verb("diagnose", *words, into="damper_diagnosed")
     _, evidence = said(found)
     kind = found["verdict"]["kind"]
     nearest = found["verdict"]["effects"]
-    tests = [read_records(files[name], DAMPER_COLUMNS)[0] for name in DAMPER_TEST]
-    fit = [read_records(files[name], DAMPER_COLUMNS)[0] for name in DAMPER_FIT]
-    bare = calibrate(load_model(MODELS / "mr_damper.yaml"), fit, settings=FitSettings(length=DAMPER_SEGMENT)).model
+    bare = calibrate(load_model(path), fit, settings=FitSettings(length=DAMPER_SEGMENT)).model
     added = work.verb("add", "presliding", *words, into="damper_added")
     values = {p["key"]: p["value"] for p in added["parameters"]}
     bare_values = {key: bare.value(key) for key in bare.free_keys()}
     loops = [
-        {"measured": r["force"], "viscous and dry": force(r, bare_values),
-         "with presliding": force(r, values)}
+        {"measured": r["force"], "viscous and dry": force(r, bare_values), "with presliding": force(r, values)}
         for r in tests
-    ]  # fmt: skip
+    ]
     off = {law: rms(np.concatenate([own[law] - own["measured"] for own in loops])) for law in loops[0]}
     work.picture("mr_damper", [(f"{name}, a test record", r.time, own)
                                for name, r, own in zip(DAMPER_TEST, tests, loops, strict=True)], "N")  # fmt: skip

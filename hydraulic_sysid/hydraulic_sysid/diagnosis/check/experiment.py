@@ -79,12 +79,9 @@ def _slow(seen: Observed, frequency: float) -> Finding:
 
 def small_steps(records: Sequence[Observed]) -> list[Finding]:
     """The integrator needs many steps from sample to sample, for what is far faster than the records."""
-    if not records:
-        return []
     model = records[0].plant.model
     cause, rate, step = Plant.for_fits(model).fastest
-    seen = max(records, key=lambda s: s.record.dt)
-    steps = seen.record.dt / step
+    steps = max(s.record.dt for s in records) / step
     if steps <= _MANY:
         return []
     mass = quantity(model.value("moving_mass"), "kg")
