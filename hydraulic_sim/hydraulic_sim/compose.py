@@ -78,6 +78,11 @@ class Layout:
         """Length of M."""
         return max((s.stop for s in self.memories.values()), default=0)
 
+    @cached_property
+    def places(self) -> tuple[str, ...]:
+        """What lies in X and M, in order: libraries of which this is the same have the same arrays."""
+        return (*self.states, *(f"{name}[{part.stop - part.start}]" for name, part in self.memories.items()))
+
 
 class Writer:
     """Writes the calls of one library's effects."""

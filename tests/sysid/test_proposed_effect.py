@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hydraulic_sim.effect import Effect
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.registry import Library, library, load_effect
@@ -27,18 +28,26 @@ from hydraulic_sysid.diagnosis.proposed_effect.laws import (
     best_law,
     spline,
 )
-from hydraulic_sysid.diagnosis.search.nonparametric import FILES
+from hydraulic_sysid.diagnosis.search.nonparametric import FILES, WITH_MEMORY
+from hydraulic_sysid.diagnosis.search.nonparametric_curves import Place
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 
 SIGNALS = {
     "position": 0.13, "velocity": -0.07, "pressure_a": 6e6, "pressure_b": 4.5e6, "pressure_difference": 1.5e6,
     "opening": 0.3, "t": 4.0, "direction": -1.0, "reading": 0.131, "reading_a": 6.01e6, "reading_b": 4.52e6,
+    "lagged_velocity": -0.04,
 }  # fmt: skip
 PLACES = [
     (file, number, variable)
-    for file in FILES
+    for file in (*FILES, *WITH_MEMORY)
     for number, variable in enumerate(load_effect(file).effect.kernel.__globals__["VARIABLES"])
 ]
+
+
+def place(hat: Effect, variable: str, number: int = 0, **shape: float) -> Place:
+    """Without a plant."""
+    plant: Any = None
+    return Place(plant, hat, number, variable, np.zeros(0), shape)
 
 
 def call(kernel, **parameters):
@@ -56,7 +65,9 @@ def test_a_file_does_at_its_place_what_the_curve_did(file: Path, number: int, va
         heights = np.zeros(17)
         heights[middle] = height
         own = FittedLaw(spline(17), heights, (), 1.0, -1.0, knots)
-        text = effect_text(hat, variable, own, (float(knots[0]), float(knots[-1])), "Evidence.", ["a"])
+        lag = {"lag": 0.004} if file in WITH_MEMORY else {}
+        at, extent = place(hat, variable, number, **lag), (float(knots[0]), float(knots[-1]))
+        text = effect_text(at, own, extent, "Evidence.", ["a"])
         path = tmp_path / f"written_{middle}.py"
         path.write_text(text)
         written = load_effect(path).effect
@@ -65,6 +76,8 @@ def test_a_file_does_at_its_place_what_the_curve_did(file: Path, number: int, va
         expected = call(hat.kernel, over=float(number), centre=centre, width=step, height=height)
         assert call(written.kernel, **defaults) == pytest.approx(expected, rel=1e-3), text
         assert (variable in UNITS) is (variable not in ("opening", "size_of_opening")), "a unit, or a pure number"
+        assert {p.name: p.default for p in written.parameters if p.unit == "s"} == lag
+        assert written.states == hat.states and (hat.dynamics is None or written.dynamics(0.3, 0.004) == (250.0, 0.3))
         assert max(map(len, text.splitlines())) <= 120
     assert Library([*(library().file(n) for n in library()), load_effect(path)])  # slot, signals and names are in order
 
@@ -120,7 +133,7 @@ def test_the_text_of_a_law_is_its_basis(law, tmp_path: Path) -> None:
     knots = np.linspace(-1.0, 1.0, 5) if law.name == "spline" else None
     fitted = FittedLaw(law, coefficients, shape, 1.0, -1.0, knots)
     path = tmp_path / "written.py"
-    path.write_text(effect_text(hat, "position", fitted, (-1.0, 1.0), "Evidence.", ["a"]))
+    path.write_text(effect_text(place(hat, "position"), fitted, (-1.0, 1.0), "Evidence.", ["a"]))
     written = load_effect(path).effect
     defaults = {p.name: p.default for p in written.parameters}
     for z in (-0.9, -0.35, 0.0, 0.2, 0.77):
@@ -188,5 +201,5 @@ def test_the_name_of_a_record_runs_nothing(tmp_path: Path) -> None:
     fitted = FittedLaw(spline(3), np.ones(3), (), 1.0, -1.0, np.array([0.0, 1.0, 2.0]))
     hostile = ['"""\nraise SystemExit\n"""', "a\\", 'b"; import os #', "{0}", "\x00\r\n"]
     path = tmp_path / "written.py"
-    path.write_text(effect_text(hat, variable, fitted, (0.0, 2.0), "Evidence.", hostile))
+    path.write_text(effect_text(place(hat, variable), fitted, (0.0, 2.0), "Evidence.", hostile))
     assert "import os" in load_effect(path).effect.source

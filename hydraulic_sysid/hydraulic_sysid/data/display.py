@@ -42,6 +42,7 @@ UNITS = {
     "reading": "m",
     "velocity": "m/s",
     "speed": "m/s",
+    "lagged_velocity": "m/s",
     "pressure_a": "Pa",
     "pressure_b": "Pa",
     "load_pressure": "Pa",

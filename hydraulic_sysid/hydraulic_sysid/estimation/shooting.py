@@ -74,8 +74,8 @@ class Shooting:
     misfit: float = 1.0
 
     @cached_property
-    def _known(self) -> dict[tuple[int, tuple[float | str, ...]], tuple[Array, Array]]:
-        """What was propagated along a record, by record and path: most plants of a fit share it."""
+    def _known(self) -> dict[tuple[int, tuple[float | str, ...], tuple[str, ...]], tuple[Array, Array]]:
+        """What was propagated along a record, by record, path and library: most plants of a fit share it."""
         return {}
 
     @cached_property
@@ -107,7 +107,16 @@ class Shooting:
                 f"{plant.model.name!r}: the physics asks for steps of {plant.longest_step:.2g} s, at the beginning of "
                 f"the fit for {self.plant.longest_step:.2g} s"
             )
-        return self.residuals(plant, initial_states)
+        return self.residuals(plant, [self._laid_out(plant, states) for states in initial_states])
+
+    def _laid_out(self, plant: Plant, states: Array) -> Array:
+        """These states (S, n_states) as another plant has them, whose library may have effects with more."""
+        own = self.plant.state_names
+        if plant.state_names == own:
+            return states
+        other = np.zeros((len(states), len(plant.state_names)))
+        other[:, [plant.state_names.index(name) for name in own]] = states
+        return other
 
     def residuals(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
         """(S, m) per record: measured − simulated over the noise, the priors of the initial states appended."""
@@ -192,7 +201,7 @@ class Shooting:
         # A sensor's offset or scale is no error of the state: what it reads is compared, not what is.
         seen = states.copy()
         seen[:, [plant.state_names.index(c) for c in segments.channels]] = run[:, 0]
-        off = (self.initial_states[i] - seen)[:, segments.free] / segments.prior_std
+        off = (self.initial_states[i][:, segments.free] - seen[:, segments.free]) / segments.prior_std
         if segments.tracked:
             off = np.where(segments.unmeasured_pressures, self.misfit / self.plant.value("supply_pressure") * off, off)
         return segments.deviation(run, off)
@@ -253,13 +262,14 @@ class Shooting:
 
         Only these ``columns`` of the states are of use; their memory ``hangs_on`` these effects and values.
         """
-        known = self._known.get((i, path))
+        key = (i, path, plant.layout.places)
+        known = self._known.get(key)
         if known is None:
             if len(self._known) > _MOST_KNOWN:
                 self._known.clear()
             segments, run_up = self.segments[i], self._run_up(plant, i, hangs_on, columns)
             known = plant.track(segments.drive, segments.record.dt, segments.first, segments.smoothed, run_up)
-            self._known[i, path] = known
+            self._known[key] = known
         return known
 
     def _run_up(self, plant: Plant, i: int, hangs_on: tuple[float | str, ...], columns: list[int]) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import textwrap
 from collections import Counter
@@ -15,6 +16,7 @@ import numpy as np
 from hydraulic_sim.arrays import Array
 from hydraulic_sim.effect import Effect
 from hydraulic_sysid.data.display import UNITS
+from hydraulic_sysid.diagnosis.search.nonparametric_curves import Place
 
 from .laws import FittedLaw
 
@@ -30,21 +32,23 @@ _DIGITS = 5
 _REACH = 10.0  # times its value that a coefficient may be
 _SHAPE_REACH = {"period": 1.1}  # times the value that a shape parameter may be, and its inverse
 _WIDEST = 5.0
+_LATEST = 20.0  # times the lag of a law that remembers, and its inverse
 _MARGIN = 3.0  # on the steepness that the integrator's step follows: a fit may move the law
 _MOST_NAMES = 6
 _WIDTH = 116
 
 
 def effect_text(
-    effect: Effect, variable: str, fitted: FittedLaw, extent: tuple[float, float], evidence: str, records: Sequence[str]
+    at: Place, fitted: FittedLaw, extent: tuple[float, float], evidence: str, records: Sequence[str]
 ) -> str:
     """The file.
 
-    :param effect: the hat function's at that place (`search.nonparametric`)
+    :param at: the place of the law, and its variable
     :param fitted: coefficients in the unit of the hat function's height
     :param extent: least and largest value of the variable in the records
     :param evidence: sentences for the docstring
     """
+    effect, variable = at.effect, at.variable
     place: Mapping[str, Any] = effect.kernel.__globals__
     returns = place["RETURNS"] if isinstance(place["RETURNS"], str) else place["RETURNS"][variable]
     z = place.get("EXPRESSIONS", {}).get(variable) or EXPRESSIONS.get(variable, variable)
@@ -56,6 +60,7 @@ def effect_text(
     summary = f"{effect.summary.removesuffix(' of any shape')} that depends on the {words}"
     equation = effect.equation.replace("height*hat(z)", "f(z)") + f"; f(z) = {law.equation}; z: {words}"
     imports, rate = _step_rate(effect, signals, fitted, extent)
+    dynamics, states = _memory(effect)
     constants = []
     if fitted.knots is not None:
         first, step = float(fitted.knots[0]), float(fitted.knots[1] - fitted.knots[0])
@@ -75,12 +80,13 @@ def effect_text(
         "",
         *(["import math", ""] if needs_math else []),
         *imports,
-        "from hydraulic_sim.effect import Effect, Parameter",
+        f"from hydraulic_sim.effect import Effect, Parameter{', State' if effect.states else ''}",
         "",
         *constants,
         *_text_argument("SOURCE", source, " = ", ""),
         "",
         "",
+        *dynamics,
         *_signature(arguments),
         *(f"    {line}" for text in body for line in _broken(text)),
         "",
@@ -90,8 +96,9 @@ def effect_text(
         *(f"    {line}" for line in _text_argument("summary", summary)),
         "    kernel=add,",
         "    parameters=(",
-        *(f"        {line}" for p in _parameters(fitted, unit, own, extent, words) for line in _two_lines(p)),
+        *(f"        {line}" for p in _parameters(at, fitted, unit, own, extent) for line in _two_lines(p)),
         "    ),",
+        *(f"    {line}" for line in states),
         *(f"    {line}" for line in _text_argument("equation", equation)),
         "    source=SOURCE,",
         f"    excited_by={_quoted(f'motion over the whole range of the {words}')},",
@@ -145,8 +152,20 @@ def _names(expression: str) -> set[str]:
     return {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)} - {"abs", "math", "max", "min"}
 
 
-def _parameters(fitted: FittedLaw, unit: str, own: str, extent: tuple[float, float], words: str) -> list[str]:
-    law, found = fitted.law, []
+def _memory(effect: Effect) -> tuple[list[str], list[str]]:
+    """Lines of what a law remembers: its dynamics, and what the effect says of it; none for one that does not."""
+    if not effect.states or effect.dynamics is None:
+        return [], []
+    states = ", ".join(
+        f"State({_quoted(s.name)}, {_quoted(s.unit)}, kind={_quoted(s.kind)}, scale={s.scale!r})"
+        for s in effect.states
+    )
+    source = inspect.getsource(effect.dynamics).splitlines()
+    return [*source, "", ""], [f"dynamics={effect.dynamics.__name__},", f"states=({states},),"]
+
+
+def _parameters(place: Place, fitted: FittedLaw, unit: str, own: str, extent: tuple[float, float]) -> list[str]:
+    law, found, words = fitted.law, list[str](), place.variable.replace("_", " ")
     sizes: dict[int, float] = {}
     for power, value in zip(law.powers, fitted.coefficients.tolist(), strict=True):
         sizes[power] = max(sizes.get(power, 0.0), abs(value))
@@ -165,6 +184,10 @@ def _parameters(fitted: FittedLaw, unit: str, own: str, extent: tuple[float, flo
             reach = _SHAPE_REACH.get(name, _WIDEST)
             bounds = (value / reach, value * reach)
         found.append(_parameter(name, own, value, bounds, f"{name} of the law, {words}"))
+    for p in place.effect.parameters:
+        if p.name in place.shape:
+            value = place.shape[p.name]
+            found.append(_parameter(p.name, p.unit, value, (value / _LATEST, value * _LATEST), p.description))
     return found
 
 
@@ -195,6 +218,8 @@ def _step_rate(
         level = _rounded(_MARGIN * float(np.abs(values).max()), 2)
         return ["from hydraulic_sim.base import dry_friction_rate"], f"dry_friction_rate({level!r}, p)"
     steepest = _rounded(_MARGIN * float(np.abs(np.gradient(values, z)).max()), 2)
+    if effect.states:  # the lag and the force, one after the other
+        return [], f'math.sqrt({steepest!r} / (p["moving_mass"] * p["lag"]))'
     if "position" in signals:
         return [], f'math.sqrt({steepest!r} / p["moving_mass"])'
     return ([], f'{steepest!r} / p["moving_mass"]') if "velocity" in signals else ([], "")

@@ -7,8 +7,9 @@ something is a bent one, and what is missing looks different from it. From there
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,22 +23,27 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import percent
 from hydraulic_sysid.diagnosis.search.candidates import subsystem
 from hydraulic_sysid.diagnosis.search.diagnosis import Remaining
+from hydraulic_sysid.diagnosis.search.force_balance import drives_by_force
+from hydraulic_sysid.diagnosis.search.force_curves import ForceCurve, Forces
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
-from hydraulic_sysid.diagnosis.search.nonparametric import FILES
+from hydraulic_sysid.diagnosis.search.nonparametric import FILES, WITH_MEMORY
 from hydraulic_sysid.diagnosis.search.nonparametric_curves import (
     NonparametricCurve,
     Place,
+    curve,
     curve_between,
     curve_normal,
     places,
+    places_with_memory,
     unexplained,
 )
+from hydraulic_sysid.diagnosis.search.score_test import ENOUGH
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parameters import Priors
 
 from .effect_file import effect_text
-from .laws import FINE, PERIODIC, CurveEquations, FittedLaw, best_law
+from .laws import FINE, PERIODIC, CurveEquations, FittedLaw, best_law, spline
 
 NEAR = 0.8  # of the reduction of the best curve, from which another is fitted too
 MOST_FITTED = 2
@@ -48,7 +54,14 @@ PERIODIC_PLACES = (
 )  # fmt: skip
 """Where something may go round and round: threads and magnets, neighbouring machines, pumps, ports."""
 LEAST = 0.5  # of what noise does not explain, which a law must explain to be worth a file
+PLENTY = 0.8
+"""Of what noise does not explain: a curve that explains so much ends the search for others."""
+LAGS = (2.0, 8.0, 32.0)  # sampling intervals by which it may follow, to begin with
+FORCE_LAGS = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # likewise, where nothing is simulated
+FORCES, MOTION = ("unknown_force", "unknown_friction"), ("position", "velocity", "speed")
+"""Where forces are, and over what they may be where the drive that answers to them is the force."""
 SHARES = (1.0, 0.3, 0.1)  # of a curve, from the best of which its fit begins: to first order it is often far too large
+_FORCE_KNOTS = 9
 _FIRST = FitSettings(most_steps=8, least_gain=5e-3)
 _USUAL = (0.01, 0.99)  # quantiles of a variable between which a spline has its knots
 _EDGE = 0.02  # of the range of a variable, by which knots reach beyond it
@@ -87,11 +100,15 @@ class ProposedEffect:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A place and variable with a law there, and by how much it lowers the sum of squares."""
+    """A place and variable with a law there, and by how much it lowers the sum of squares.
+
+    ``beside``: values of free parameters that belong to it.
+    """
 
     place: Place
     knots: Array
     fitted: FittedLaw
+    beside: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def words(self) -> str:
@@ -120,13 +137,13 @@ def propose(
     """
     part, curves, beside = left.at, left.curves, left.beside
     with tempfile.TemporaryDirectory() as folder:
-        found = []
-        for number, candidate in enumerate(_candidates(part, curves, say)[:MOST_FITTED]):
+        found = list[_Fit]()
+        for number, candidate in enumerate(_worth_fitting(part, curves, say)):
+            if any(_cost(part) - f.cost > PLENTY * unexplained(part) for f in found):
+                break
             say(f"fitting a curve over {candidate.words}")
-            try:
+            with suppress(HydraulicError):  # the plant does not run with it
                 found.append(_fitted(part, candidate, Path(folder) / str(number) / f"{name}.py", records))
-            except HydraulicError:  # the plant does not run with it
-                continue
         if not found:
             return None
         first = min(found, key=lambda f: f.cost)
@@ -140,11 +157,45 @@ def propose(
         f"Of what the model leaves beyond the noise, such a curve over the {final.words} explains {percent(share)}, "
         f"all free parameters refitted. {_others(curves, final.place)}"
     )
-    text = effect_text(
-        effect, final.place.variable, final.fitted, _extent(final.place.values), evidence.strip(), records
-    )
+    text = effect_text(final.place, final.fitted, _extent(final.place.values), evidence.strip(), records)
     law = final.fitted.law.name
     return ProposedEffect(name, text, effect.name, subsystem(effect), final.place.variable, law, share, tuple(beside))
+
+
+def _worth_fitting(
+    part: Linearisation, curves: Sequence[NonparametricCurve], say: Callable[[str], None]
+) -> Iterator[Candidate]:
+    """Curves that are fitted one after the other, until one explains `PLENTY`."""
+    if drives_by_force(part.model):
+        say("curves of the force that the motion asks for")
+        yield from by_force(part)
+    yield from _candidates(part, curves, say)[:MOST_FITTED]
+    late = None if drives_by_force(part.model) else _with_memory(part, say)
+    if late is not None:
+        yield late
+
+
+def by_force(part: Linearisation) -> list[Candidate]:
+    """The best curves over the motion as it is and as it was, by the forces that records ask for."""
+    forces = Forces.of(part.model, part.parameters, part.split.segments)
+    if forces is None:
+        return []
+    dt = min(s.record.dt for s in part.split.segments)
+    silent: Callable[[str], None] = lambda _: None  # noqa: E731
+    kinds = (
+        [p for p in places(part, silent, FORCES) if p.variable in MOTION],
+        list(places_with_memory(part, silent, [n * dt for n in FORCE_LAGS])),
+    )
+    best = [max((_curve_by_force(forces, p) for p in kind), key=lambda c: c.share) for kind in kinds if kind]
+    return [
+        Candidate(c.place, c.knots, FittedLaw(spline(len(c.knots)), c.heights, (), c.share, 0.0, c.knots), c.values)
+        for c in sorted(best, key=lambda c: -c.share)
+    ]
+
+
+def _curve_by_force(forces: Forces, place: Place) -> ForceCurve:
+    low, high = (float(np.quantile(place.values, q)) for q in _USUAL)
+    return forces.curve(place, np.linspace(low, high, _FORCE_KNOTS, dtype=np.float64))
 
 
 def _candidates(
@@ -157,14 +208,22 @@ def _candidates(
     periodic = set(PERIODIC_PLACES) if curves[0].share < CLEAR else set()
     found = []
     for place in places(part, lambda _: None):
-        key = (place.effect.name, place.variable)
-        if key in wanted:
+        if place.key in wanted:
             found.append(_candidate(part, place, FINE))
-        if key in periodic:
+        if place.key in periodic:
             say(f"periodic laws over {place.variable}")
             found.append(_candidate(part, place, PERIODIC))
     every = sorted((c for c in found if c is not None), key=lambda c: -c.fitted.reduction)
     return [c for c in every if c.fitted.reduction >= NEAR * every[0].fitted.reduction]
+
+
+def _with_memory(part: Linearisation, say: Callable[[str], None]) -> Candidate | None:
+    """The best place for a curve that remembers."""
+    sample, _ = part.sample(ENOUGH)
+    dt = min(s.record.dt for s in part.split.segments)
+    rough = [(curve(sample, place), place) for place in places_with_memory(sample, say, [n * dt for n in LAGS])]
+    found = [(c.reduction, number) for number, (c, _) in enumerate(rough) if c is not None]
+    return _candidate(part, rough[max(found)[1]][1], FINE) if found else None
 
 
 def _candidate(part: Linearisation, place: Place, number: int) -> Candidate | None:
@@ -191,20 +250,23 @@ def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequ
     """A candidate's law in the model, fitted with all else that is free, and held there."""
     place, fitted, name = candidate.place, candidate.fitted, file.stem
     file.parent.mkdir()
-    file.write_text(effect_text(place.effect, place.variable, fitted, _extent(place.values), "A first fit.", records))
-    hat = [f for f in FILES if f.stem == place.effect.name]  # is needed when the law is taken: compiled once for both
+    file.write_text(effect_text(place, fitted, _extent(place.values), "A first fit.", records))
+    # The hat function is needed when the law is taken: compiled once for both.
+    hat = [f for f in (*FILES, *WITH_MEMORY) if f.stem == place.effect.name]
     model = replace(part.model, user_effects=(*part.model.user_effects, *hat, file)).with_effect(name)
-    own = [f"{name}.{p}" for p in (*fitted.law.coefficients, *fitted.law.shapes)]
+    own = [f"{name}.{p}" for p in (*fitted.law.coefficients, *fitted.law.shapes, *place.shape)]
     number = len(fitted.law.coefficients)
     keys, priors = (*part.parameters.keys, *own), _priors(part)
-    model = begun(part, model, own[:number], keys, priors)
+    model = begun(part, model.with_values(candidate.beside), own[:number], keys, priors)
     done = fit_segments(Plant.for_fits(model), part.split.segments, keys, _FIRST, priors=priors)
     for key in own:
         model = model.with_entry(key, free=False)
     at = Linearisation.of(model.with_values(done.values, source="fitted"), part.split, priors)
     reached = [at.model.value(key) for key in own]
-    now = replace(fitted, coefficients=np.array(reached[:number]), shape=tuple(reached[number:]))
-    return _Fit(candidate, at, _cost(at), now.values(candidate.knots))
+    end = number + len(fitted.shape)
+    now = replace(fitted, coefficients=np.array(reached[:number]), shape=tuple(reached[number:end]))
+    there = replace(place, shape=dict(zip(place.shape, reached[end:], strict=True)))
+    return _Fit(replace(candidate, place=there), at, _cost(at), now.values(candidate.knots))
 
 
 def begun(part: Linearisation, model: Model, heights: Sequence[str], keys: Sequence[str], priors: Priors) -> Model:
@@ -236,8 +298,12 @@ def _priors(part: Linearisation) -> Priors:
 def _law(fit: _Fit) -> Candidate | None:
     """The candidate with the law that explains most where it was fitted."""
     place, knots = fit.candidate.place, fit.candidate.knots
-    every = places(fit.at, lambda _: None, (place.effect.name,))
-    here = next((p for p in every if _key(p) == _key(place)), None)
+    silent: Callable[[str], None] = lambda _: None  # noqa: E731
+    if place.shape:
+        every = places_with_memory(fit.at, silent, place.shape.values())
+    else:
+        every = places(fit.at, silent, (place.effect.name,))
+    here = next((p for p in every if p.key == place.key), None)
     normal = None if here is None else curve_normal(fit.at, here, knots)
     if normal is None:
         return None
@@ -246,10 +312,6 @@ def _law(fit: _Fit) -> Candidate | None:
     none = NormalEquations(normal.information, ((normal.gradient - normal.information @ whole)[None],))
     best = best_law(_equations(fit.at, place, none, knots, fit.cost - normal.reduction(-whole)))
     return None if best is None else replace(fit.candidate, fitted=_in_units(best, place))
-
-
-def _key(place: Place) -> tuple[str, str]:
-    return place.effect.name, place.variable
 
 
 def _extent(values: Array) -> tuple[float, float]:
@@ -261,7 +323,7 @@ def _extent(values: Array) -> tuple[float, float]:
 
 def _others(curves: Sequence[NonparametricCurve], chosen: Place) -> str:
     """What the next best curve was."""
-    other = next((c for c in curves if (c.place, c.variable) != _key(chosen)), None)
+    other = next((c for c in curves if (c.place, c.variable) != chosen.key), None)
     if other is None:
         return ""
     words = other.variable.replace("_", " ")

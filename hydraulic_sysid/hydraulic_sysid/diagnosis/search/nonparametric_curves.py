@@ -8,8 +8,9 @@ model and nothing is differentiated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -17,11 +18,13 @@ from hydraulic_sim.arrays import Array
 from hydraulic_sim.effect import Effect, Parameter
 from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.plant import Plant
+from hydraulic_sysid.diagnosis.locate.basis import lagged
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
+from hydraulic_sysid.estimation.segments import Segments
 
 from .candidates import subsystem
 from .linearisation import Linearisation
-from .nonparametric import FILES
+from .nonparametric import FILES, WITH_MEMORY
 from .score_test import ENOUGH
 
 KNOTS = 9
@@ -54,7 +57,8 @@ class NonparametricCurve:
 class Place:
     """A place of the plant where something may be added, as ``effect`` adds a hat function, and a variable there.
 
-    ``number``: the variable's among those of the effect; ``values``: what it takes in the records.
+    ``number``: the variable's among those of the effect; ``values``: what it takes in the records; ``shape``: values of
+    the parameters that the effect has besides, as the ``lag`` of one that remembers.
     """
 
     plant: Plant
@@ -62,6 +66,12 @@ class Place:
     number: int
     variable: str
     values: Array
+    shape: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What names it."""
+        return self.effect.name, self.variable
 
     @property
     def height(self) -> Parameter:
@@ -72,7 +82,7 @@ class Place:
 def nonparametric_curves(at: Linearisation, say: Callable[[str], None]) -> list[NonparametricCurve]:
     """All curves, the one that explains most first. Empty for a plant that takes none of them."""
     part, _ = at.sample(ENOUGH)
-    found = (_curve(part, place) for place in places(part, say))
+    found = (curve(part, place) for place in places(part, say))
     return sorted((c for c in found if c is not None), key=lambda c: -c.reduction)
 
 
@@ -82,22 +92,38 @@ def places(at: Linearisation, say: Callable[[str], None], names: Container[str] 
     :param names: of the places that are asked for; fewer compile faster (default: all)
     """
     files = [f for f in FILES if names is None or f.stem in names]
+    seen = _all_seen(at)
+    for plant, effect in _extended(at, files, say):
+        for number, variable in enumerate(effect.kernel.__globals__["VARIABLES"]):
+            if all(variable in values for values in seen):
+                yield Place(plant, effect, number, variable, np.concatenate([values[variable] for values in seen]))
+
+
+def places_with_memory(at: Linearisation, say: Callable[[str], None], lags: Iterable[float]) -> Iterator[Place]:
+    """Those over a variable that follows one of the motion late, with each of these time constants [s]."""
+    tried, seen = list(lags), _all_seen(at)
+    for plant, effect in _extended(at, WITH_MEMORY, say):
+        (variable,) = effect.kernel.__globals__["VARIABLES"]
+        follows = effect.kernel.__globals__["FOLLOWS"]
+        for lag in tried:
+            late = [lagged(v[follows], s.record.dt, lag) for v, s in zip(seen, at.split.segments, strict=True)]
+            own = plant.with_parameters({f"{effect.name}.lag": lag})
+            yield Place(own, effect, 0, variable, np.concatenate(late), {"lag": lag})
+
+
+def _extended(at: Linearisation, files: Sequence[Path], say: Callable[[str], None]) -> Iterator[tuple[Plant, Effect]]:
+    """The plant with each of these effects at the values of the fit, where it takes them."""
     model = replace(
         at.model, user_effects=(*at.model.user_effects, *(f for f in files if f not in at.model.user_effects))
     )
-    seen = _seen(at)
     for file in files:
         try:
             extended = model.with_effect(file.stem)
             extended.check_complete()
         except ModelError:  # the plant has no such stage
             continue
-        plant = Plant(extended).with_parameters(at.parameters.by_key)
-        effect = model.library[file.stem]
-        say(f"curve of {effect.summary}")
-        for number, variable in enumerate(effect.kernel.__globals__["VARIABLES"]):
-            if variable in seen:
-                yield Place(plant, effect, number, variable, seen[variable])
+        say(f"curve of {model.library[file.stem].summary}")
+        yield Plant(extended).with_parameters(at.parameters.by_key), model.library[file.stem]
 
 
 def curve_normal(at: Linearisation, place: Place, knots: Array) -> NormalEquations | None:
@@ -138,13 +164,11 @@ def unexplained(at: Linearisation) -> float:
     return sum(float(c.sum()) for c in at.costs) - noise
 
 
-def _seen(at: Linearisation) -> dict[str, Array]:
-    """Values that the variables take in the records."""
-    segments = at.split.segments
-    smoothed = np.concatenate([s.smoothed for s in segments])
-    position, velocity, pressure_a, pressure_b = smoothed.T
-    limit = at.model.value("drive_limit")
-    opening = np.concatenate([np.clip(s.record["drive"] / limit, -1.0, 1.0) for s in segments])
+def _seen(segments: Segments, limit: float) -> dict[str, Array]:
+    """Values (N,) that the variables take in a record; ``limit`` [V] of the drive."""
+    position, velocity, pressure_a, pressure_b = segments.smoothed.T
+    record = segments.record
+    opening = np.clip(record["drive"] / limit, -1.0, 1.0)
     values = {
         "position": position,
         "reading": position,
@@ -152,16 +176,22 @@ def _seen(at: Linearisation) -> dict[str, Array]:
         "speed": np.abs(velocity),
         "opening": opening,
         "size_of_opening": np.abs(opening),
-        "time": np.concatenate([np.arange(len(s.record)) * s.record.dt for s in segments]),
+        "time": np.arange(len(record)) * record.dt,
     }
-    if np.isfinite(smoothed).all():
+    if np.isfinite(segments.smoothed).all():
         difference = pressure_a - pressure_b
         values |= {"pressure_a": pressure_a, "pressure_b": pressure_b, "mean_pressure": 0.5 * (pressure_a + pressure_b)}
         values |= {"pressure_difference": difference, "size_of_pressure_difference": np.abs(difference)}
     return values
 
 
-def _curve(at: Linearisation, place: Place) -> NonparametricCurve | None:
+def _all_seen(at: Linearisation) -> list[dict[str, Array]]:
+    limit = at.model.value("drive_limit")
+    return [_seen(segments, limit) for segments in at.split.segments]
+
+
+def curve(at: Linearisation, place: Place) -> NonparametricCurve | None:
+    """Of so many `KNOTS` there; None where the plant does not run, or nothing visits them."""
     low, high = (float(np.quantile(place.values, q)) for q in _RANGE)
     laid = curve_between(at, place, low, high, KNOTS)
     if laid is None:

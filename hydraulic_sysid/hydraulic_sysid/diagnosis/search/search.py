@@ -27,6 +27,7 @@ from .drift import drift
 from .errors import DiagnosisError
 from .fitting import FAR_OFF, Task, quieter, retimed, spiked
 from .force_balance import drives_by_force, force_shares
+from .force_curves import Forces
 from .misfit import SMALL, Misfit, explained, material
 from .progress import OutOfTimeError
 from .recording_fits import RIVAL, RecordingFits
@@ -248,12 +249,24 @@ class Search(RecordingFits):
         self.say.reached([name], tried.misfit)
         self.say(f"fitting with {name}")
         # What the model without it left was no sure guide to noise and delays.
-        final = self.judged(self.begun_anew(self.state(tried.refit.model)))
+        states = [self.state(tried.refit.model), *self.begun_by_force(base, name)]
+        final = self.judged(self.begun_anew(min(states, key=lambda s: s.misfit.total)))
         self.say.reached([name], final.misfit)
         base = replace(self.state(base.model, self._last), refits=[tried], scores=scores)
         found = SearchResult(self.given, self.split, self.settings, base, final, {name: final.misfit}, {})
         found = self.concluded(found, others=False)
         return accidents_named(self.with_force(found, base.model, scores) if judged_by_force(base) else found)
+
+    def begun_by_force(self, base: SearchState, name: str) -> list[SearchState]:
+        """With an effect as its file has it, from the values that forces ask for beside it, where they say any.
+
+        What friction was without the effect is often far from what it is beside it.
+        """
+        model = base.linearisation.model.with_effect(name)
+        forces = Forces.of(model, base.linearisation.parameters, self.split.segments)
+        with suppress(SimulationError):  # it does not run with these values
+            return [] if forces is None else [self.state(model.with_values(forces.values))]
+        return []
 
     def reviewed(
         self, base: SearchState, state: SearchState, added: list[str], competing: dict[str, SearchState]

@@ -9,4 +9,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-FILES = tuple(sorted(p for p in Path(__file__).parent.glob("unknown_*.py")))
+FILES = tuple(sorted(Path(__file__).parent.glob("unknown_*.py")))
+WITH_MEMORY = tuple(sorted(Path(__file__).parent.glob("with_memory/unknown_*.py")))
+"""Those over a variable as it was: for a law that is proposed, not for a verdict."""

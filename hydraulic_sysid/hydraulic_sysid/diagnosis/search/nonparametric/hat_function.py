@@ -9,17 +9,21 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from typing import Any
 
 from hydraulic_sim.effect import Effect, Parameter
 
 _SOURCE = "curve of a residual"
 
 
-def effect(slot: str, kernel: Callable, unit: str, size: float, most: float, order: int) -> Effect:
+def effect(
+    slot: str, kernel: Callable, unit: str, size: float, most: float, order: int, shape: tuple[Parameter, ...] = (),
+    **more: Any,
+) -> Effect:
     """An effect whose kernel takes over, centre, width and height of a hat function.
 
     Summary and equation are the first two paragraphs of the file's docstring; ``size``, which is tried, and ``most``,
-    its bound, are in ``unit``.
+    its bound, are in ``unit``; ``shape``: parameters besides; ``more``: fields of the effect.
     """
     summary, equation, *_ = inspect.cleandoc(kernel.__globals__["__doc__"]).split("\n\n")
     return Effect(
@@ -31,6 +35,7 @@ def effect(slot: str, kernel: Callable, unit: str, size: float, most: float, ord
             Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", _SOURCE, free=False),
             Parameter("centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", _SOURCE, free=False),
             Parameter("width", "1", 1.0, (1e-12, 1e12), "half the foot [the variable's unit]", _SOURCE, free=False),
+            *shape,
         ),
         equation=equation.strip(),
         source="de Boor (1978), A Practical Guide to Splines, ch. III",
@@ -38,4 +43,5 @@ def effect(slot: str, kernel: Callable, unit: str, size: float, most: float, ord
         confused_with=(),
         distinguished_by="the variable over which the curve explains most",
         order=order,
+        **more,
     )
