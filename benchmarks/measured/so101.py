@@ -9,6 +9,7 @@ nothing; no test motion has a say. The figures of `mujoco.sysid` are those of `_
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,8 @@ QUICK = "elbow"
 JOINTS = {"pitch": "gravity_pendulum", "elbow": "gravity_pendulum", "rotation": None}
 """Joint → what is known of it: the weight of an arm; the axis of the rotation is vertical."""
 
+BESIDE = (("a dead time", "sensor_delay.delay", "ms"), ("a gap", "sensor_backlash.half_gap", "mrad"))
+
 
 def motion(folder: Path, name: str, joint: str) -> Record:
     """The first 40 s of one joint in one motion."""
@@ -41,6 +44,16 @@ def motion(folder: Path, name: str, joint: str) -> Record:
 
 def fitted(model: Model, records: list[Record]) -> Model:
     return calibrate(model, records, settings=FitSettings(length=SEGMENT)).model
+
+
+def sizes(model: Model, records: list[Record]) -> Iterator[str]:
+    """What else the motions were made for, each fitted beside the model: its size and standard error."""
+    for words, key, unit in BESIDE:
+        name = key.partition(".")[0]
+        done = calibrate(model.with_effect(name), records, settings=FitSettings(length=SEGMENT)).result
+        (found,) = (p for p in done["parameters"] if p["key"] == key)
+        times = 2e3 if name == "sensor_backlash" else 1e3
+        yield f"{words} of {times * found['value']:.2f} ± {times * found['standard_error']:.2f} {unit}"
 
 
 def study(data: Path, work: Work) -> list[Row]:
@@ -75,12 +88,14 @@ def study(data: Path, work: Work) -> list[Row]:
         if known:
             checks.append(Check(f"{joint}: {mean['before']:.1f} falls to less than half, {mean['after']:.1f} mrad",
                                 mean["after"] < 0.5 * mean["before"]))  # fmt: skip
+        beside = "" if work.quick else f"; beside it, fitted alone: {', '.join(sizes(after, fit))}"
         free = len(after.free_keys())
         rows.append(Row(
             f"SO-101 {joint}", verdict, evidence, "RMSE of position in free run, mean of 3 test motions [mrad]",
             mean["before"], mean["after"], f"mujoco[sysid] {own['version']}: {theirs:.1f} ({own['free']} parameters)",
             f"{'an arm that gravity pulls' if known else 'a vertical axis, no gravity'}; {free} free parameters; "
-            f"each test motion: {', '.join(f'{n} {e:.1f}' for n, e in zip(TEST, errors['after'], strict=True))} mrad",
+            f"each test motion: {', '.join(f'{n} {e:.1f}' for n, e in zip(TEST, errors['after'], strict=True))} mrad"
+            f"{beside}",
             checks,
         ))  # fmt: skip
         panels = [
