@@ -211,7 +211,10 @@ class FitPoint:
 
         :param least: of the sum of squares where they were taken, below which they are
         """
-        return self.settled(self.shooting, self.parameters) if self.cost < least * self.directions_cost else self
+        if not self.cost < least * self.directions_cost:
+            return self
+        again = self.settled(self.shooting, self.parameters)
+        return again if np.isfinite(again.cost) else self  # a run a little further off may leave all bounds
 
     def reweighted(self) -> FitPoint:
         """This point, or the same parameters with unmeasured pressures freer, where the model comes nearer."""
@@ -372,6 +375,8 @@ def fit_segments(
         return again if again is not point else point.with_new_directions(_OUTDATED)
 
     begin = FitPoint.begin(plant, segments, keys, settings.robust, priors, starts)
+    if not np.isfinite(begin.cost):
+        raise SimulationError(f"{plant.model.name!r} leaves all bounds from where the records show its states")
     if not keys:
         return Fit(begin.at_rest(), True, 0)
     steps = 0
