@@ -62,6 +62,7 @@ def line(name: str, row: dict[str, Any]) -> str:
 
 def examined(bench: benches.Bench, names: tuple[str, ...], given: bool) -> dict[str, Any]:
     """What was proposed for one bench, and the errors on fresh records [residual over the noise of the sensors]."""
+    from hydraulic_interfaces.errors import HydraulicError
     from hydraulic_sim.model_file import load_model
     from hydraulic_sysid.data.records import read_all
     from hydraulic_sysid.diagnosis.calibrate import calibrate
@@ -93,24 +94,27 @@ def examined(bench: benches.Bench, names: tuple[str, ...], given: bool) -> dict[
         effect = propose(left, "own_effect", [r.name for r in records]) if left else None
         if effect is None:
             return {"said": kind, "ratio": None}
+        what = f"{effect.place.removeprefix('unknown_')} over {effect.variable}: {effect.law} {effect.share:.2f}"
         file = folder / "own_effect.py"
         file.write_text(effect.text)
         for name in effect.beside:
             model = model.with_effect(name)
-        if given:
-            joined = search.state(base.model.with_effect_file(file).with_effect("own_effect")).model
-        else:
-            joined = add(model.with_effect_file(file), "own_effect", records).model
         before = calibrate(model, records, fresh).result["test"]["after"]
         hidden = bench.effects
         true = calibrate(load_model(text), made("plain", hidden), made("plain fresh", hidden, " fresh"))
-        added = evaluate(joined, fresh).rms
-        refitted = calibrate(joined, records, fresh).result["test"]["after"]
         best = true.result["test"]["after"]
-    said = f"{effect.place.removeprefix('unknown_')} over {effect.variable}: {effect.law} {effect.share:.2f}"
+        try:
+            if given:
+                joined = search.state(base.model.with_effect_file(file).with_effect("own_effect")).model
+            else:
+                joined = add(model.with_effect_file(file), "own_effect", records).model
+            added = evaluate(joined, fresh).rms
+            refitted = calibrate(joined, records, fresh).result["test"]["after"]
+        except HydraulicError as error:  # what was proposed does not run on all of the records
+            return {"said": f"{what}: {error}", "ratio": None}
     seconds = time.process_time() - begin
     return {
-        "said": said,
+        "said": what,
         "before": before,
         "added": added,
         "refitted": refitted,

@@ -151,7 +151,9 @@ def propose(
         if share < LEAST:
             return None
         say(f"the law over {first.candidate.words}")
-        final = _law(first) or first.candidate
+        final = _law(first)
+        if final is None or not _holds(part, first, final, Path(folder) / "law" / f"{name}.py", records):
+            final = first.candidate
     effect = final.place.effect
     evidence = (
         f"Of what the model leaves beyond the noise, such a curve over the {final.words} explains {percent(share)}, "
@@ -266,7 +268,21 @@ def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequ
     end = number + len(fitted.shape)
     now = replace(fitted, coefficients=np.array(reached[:number]), shape=tuple(reached[number:end]))
     there = replace(place, shape=dict(zip(place.shape, reached[end:], strict=True)))
-    return _Fit(replace(candidate, place=there), at, _cost(at), now.values(candidate.knots))
+    return _Fit(replace(candidate, place=there, fitted=now), at, _cost(at), now.values(candidate.knots))
+
+
+def _holds(part: Linearisation, fit: _Fit, law: Candidate, file: Path, records: Sequence[str]) -> bool:
+    """Whether a law that was taken from a fitted curve explains at least half of what the curve does."""
+    file.parent.mkdir()
+    file.write_text(effect_text(law.place, law.fitted, _extent(law.place.values), "A law.", records))
+    keys = part.parameters.keys
+    model = replace(part.model, user_effects=(*part.model.user_effects, file)).with_effect(file.stem)
+    model = model.with_values({key: fit.at.model.value(key) for key in keys})
+    try:
+        begin = FitPoint.begin(Plant.for_fits(model), part.split.segments, keys, priors=_priors(part))
+    except HydraulicError:  # it does not run
+        return False
+    return _cost(part) - begin.cost > 0.5 * (_cost(part) - fit.cost)
 
 
 def begun(part: Linearisation, model: Model, heights: Sequence[str], keys: Sequence[str], priors: Priors) -> Model:

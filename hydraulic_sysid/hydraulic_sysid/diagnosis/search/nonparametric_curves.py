@@ -129,7 +129,8 @@ def _extended(at: Linearisation, files: Sequence[Path], say: Callable[[str], Non
 def curve_normal(at: Linearisation, place: Place, knots: Array) -> NormalEquations | None:
     """Of the heights (K,) of hat functions at equally spaced ``knots`` (K,), over those of the height's default.
 
-    The free parameters are eliminated. None where the plant does not run.
+    The free parameters are eliminated, each as one that may be anywhere between its bounds (a variance of a twelfth of
+    their distance squared): what only they could undo, no curve may do. None where the plant does not run.
     """
     name, width = place.effect.name, float(knots[1] - knots[0])
     hats = [
@@ -144,7 +145,11 @@ def curve_normal(at: Linearisation, place: Place, knots: Array) -> NormalEquatio
         )
     except SimulationError:
         return None
-    return at.bordered([c[..., 1:] - c[..., :1] for c in changed]).marginal(len(at.parameters))
+    normal, own = at.bordered([c[..., 1:] - c[..., :1] for c in changed]), len(at.parameters)
+    information = normal.information.copy()
+    down, up = at.parameters.reach
+    information[np.arange(own), np.arange(own)] += 12.0 / (up - down) ** 2
+    return replace(normal, information=information).marginal(own)
 
 
 def curve_between(
