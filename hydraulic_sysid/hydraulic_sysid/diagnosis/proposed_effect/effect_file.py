@@ -173,8 +173,11 @@ def _parameters(place: Place, fitted: FittedLaw, unit: str, own: str, extent: tu
         zip(law.coefficients, fitted.coefficients.tolist(), law.powers, strict=True)
     ):
         most = _rounded(_REACH * sizes[power], 1)
+        least = -most
+        if fitted.knots is not None and place.height.bounds[0] == 0.0:
+            least, value = 0.0, max(value, 0.0)
         at = f"law at {words} {fitted.knots[i]:.4g} {own}" if fitted.knots is not None else f"{name} of the law"
-        found.append(_parameter(name, per(unit, own, power), value, (-most, most), at, "null=0.0"))
+        found.append(_parameter(name, per(unit, own, power), value, (least, most), at, "null=0.0"))
     low, high = extent
     for name, value in zip(law.shapes, fitted.shape, strict=True):
         if name in ("corner", "centre"):

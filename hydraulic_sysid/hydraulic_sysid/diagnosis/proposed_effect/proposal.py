@@ -53,6 +53,7 @@ PERIODIC_PLACES = (
     ("unknown_supply", "time"), ("unknown_opening", "opening"), ("unknown_opening", "time"),
 )  # fmt: skip
 """Where something may go round and round: threads and magnets, neighbouring machines, pumps, ports."""
+HOLDS = 0.9  # of what a curve explains, which a law taken from it must explain as it is: else the curve is written
 LEAST = 0.5  # of what noise does not explain, which a law must explain to be worth a file
 PLENTY = 0.8
 """Of what noise does not explain: a curve that explains so much ends the search for others."""
@@ -272,7 +273,7 @@ def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequ
 
 
 def _holds(part: Linearisation, fit: _Fit, law: Candidate, file: Path, records: Sequence[str]) -> bool:
-    """Whether a law that was taken from a fitted curve explains at least half of what the curve does."""
+    """Whether a law that was taken from a fitted curve explains in the model `HOLDS` of what the curve does."""
     file.parent.mkdir()
     file.write_text(effect_text(law.place, law.fitted, _extent(law.place.values), "A law.", records))
     keys = part.parameters.keys
@@ -282,7 +283,7 @@ def _holds(part: Linearisation, fit: _Fit, law: Candidate, file: Path, records: 
         begin = FitPoint.begin(Plant.for_fits(model), part.split.segments, keys, priors=_priors(part))
     except HydraulicError:  # it does not run
         return False
-    return _cost(part) - begin.cost > 0.5 * (_cost(part) - fit.cost)
+    return _cost(part) - begin.cost > HOLDS * (_cost(part) - fit.cost)
 
 
 def begun(part: Linearisation, model: Model, heights: Sequence[str], keys: Sequence[str], priors: Priors) -> Model:

@@ -18,20 +18,22 @@ _SOURCE = "curve of a residual"
 
 def effect(
     slot: str, kernel: Callable, unit: str, size: float, most: float, order: int, shape: tuple[Parameter, ...] = (),
-    **more: Any,
+    passive: bool = False, **more: Any,
 ) -> Effect:
     """An effect whose kernel takes over, centre, width and height of a hat function.
 
     Summary and equation are the first two paragraphs of the file's docstring; ``size``, which is tried, and ``most``,
-    its bound, are in ``unit``; ``shape``: parameters besides; ``more``: fields of the effect.
+    its bound, are in ``unit``; ``shape``: parameters besides; ``passive``: it may not be
+    negative, since that would feed itself, as a leak that flows uphill; ``more``: fields of the effect.
     """
+    least = 0.0 if passive else -most
     summary, equation, *_ = inspect.cleandoc(kernel.__globals__["__doc__"]).split("\n\n")
     return Effect(
         slot=slot,
         summary=summary[:1].lower() + summary[1:].rstrip("."),
         kernel=kernel,
         parameters=(
-            Parameter("height", unit, size, (-most, most), "height of the hat function", _SOURCE, null=0.0),
+            Parameter("height", unit, size, (least, most), "height of the hat function", _SOURCE, null=0.0),
             Parameter("over", "1", 0.0, (0.0, 9.0), "the variable's place in VARIABLES", _SOURCE, free=False),
             Parameter("centre", "1", 0.0, (-1e12, 1e12), "the variable at the top [its unit]", _SOURCE, free=False),
             Parameter("width", "1", 1.0, (1e-12, 1e12), "half the foot [the variable's unit]", _SOURCE, free=False),

@@ -16,4 +16,4 @@ def add(position, t, velocity, pressure_difference, over, centre, width, height)
     return -q, q
 
 
-EFFECT = effect("flow", add, "m^3/(s*Pa)", size=1e-12, most=1.0, order=89)
+EFFECT = effect("flow", add, "m^3/(s*Pa)", size=1e-12, most=1.0, order=89, passive=True)
