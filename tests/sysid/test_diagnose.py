@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, verdict, worth
+from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, uncertainty, verdict, worth
 from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits, varied
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
@@ -31,7 +32,7 @@ from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, Record
 from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState, Together
 from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
-from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
+from hydraulic_sysid.diagnosis.search.uncertainty import Known, parameter_errors
 from hydraulic_sysid.diagnosis.search.worth import (
     absorbs_discrepancy,
     decisive,
@@ -364,6 +365,41 @@ def test_a_law_that_fits_only_bent_to_its_limits_is_not_named(model, damping: fl
     misfits = {"structural_flexibility": final.misfit}
     found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {})
     assert verdict.kind_of(found, tied=tied) == kind
+
+
+@pytest.mark.parametrize(("left", "kind"), [(3900.0, verdict.OUTSIDE), (3010.0, verdict.MISSING)])
+def test_an_effect_on_whose_size_segments_disagree_is_not_named(model, left: float, kind: str) -> None:
+    """Where more than noise is left: it only follows what another does."""
+    base, final = state(model, 30000.0, {}), state(model.with_effect("constant_load"), left, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
+    assert verdict.kind_of(found, tied=False) == verdict.MISSING
+    found = replace(found, disputed=True)
+    assert verdict.kind_of(found, tied=False) == kind
+    assert "sizes of constant_load that differ by more than it is" in verdict.sentences(
+        found, verdict.Verdict(verdict.OUTSIDE, ["constant_load"], {}, {}), []
+    )
+
+
+@pytest.mark.parametrize(
+    ("mass", "damping", "at_bound", "nothing"),
+    [
+        (283.0, 0.03, None, True),  # 256 kg, with an interval from -27 to 539
+        (100.0, 0.03, None, False),
+        (np.inf, 0.03, None, True),  # the records do not determine it
+        (np.inf, 0.03, "highest", False),
+    ],
+)
+def test_an_interval_that_holds_nothing(
+    model, mass: float, damping: float, at_bound: str | None, nothing: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with_it = model.with_effect("structural_flexibility", {"mass": 256.0, "frequency": 1.9, "damping": damping})
+    known = {
+        "structural_flexibility.mass": Known(0.5 * mass, mass, at_bound),
+        "structural_flexibility.damping": Known(0.1, 0.2, None),  # a shape has no size
+    }
+    monkeypatch.setattr(uncertainty, "parameter_errors", lambda at: known)
+    at: Any = SimpleNamespace(model=with_it)
+    assert uncertainty.may_be_nothing(at, with_it.library["structural_flexibility"]) is nothing
 
 
 @pytest.mark.parametrize("exponent", [1.2, 1.4])

@@ -35,6 +35,7 @@ from .score_test import CandidateScore, score
 from .search_state import SearchResult, SearchState
 from .set_aside import accidents
 from .spectral_lines import record_features
+from .uncertainty import may_be_nothing
 from .worth import (
     FURTHER,
     MOSTLY,
@@ -86,7 +87,10 @@ class Search(RecordingFits):
             found = accidents_named(self.by_force(concluded))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)
-            return self.with_drift(found)
+            found = self.with_drift(found)
+            at = found.final.linearisation
+            disputed = bool(found.added) and may_be_nothing(at, at.model.library[found.added[0]])
+            return replace(found, disputed=disputed)
         except (OutOfTimeError, KeyboardInterrupt):
             if not self.path:
                 raise

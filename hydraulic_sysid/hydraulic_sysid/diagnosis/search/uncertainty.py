@@ -23,6 +23,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from hydraulic_sim.arrays import Array, Index
+from hydraulic_sim.effect import Effect
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
@@ -76,6 +77,20 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
             at_bound.get(key),
         )
     return found
+
+
+def may_be_nothing(at: Linearisation, effect: Effect) -> bool:
+    """Whether an effect of a fitted model may as well be absent: every interval of a size of it holds its null value.
+
+    A law that is there has much the same size in all segments; one that only follows what another does has not, and
+    then its error by their scatter is as large as it is. One at a bound is no matter of that.
+    """
+    known = parameter_errors(at)
+    nulls = {f"{effect.name}.{p.name}": p.null for p in effect.parameters if p.null is not None}
+    sized = {key: null for key, null in nulls.items() if key in known}
+    return bool(sized) and all(
+        known[k].at_bound is None and abs(at.model.value(k) - null) <= known[k].half_width for k, null in sized.items()
+    )
 
 
 def _share(model: Model, key: str) -> float:
