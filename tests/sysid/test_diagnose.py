@@ -42,7 +42,7 @@ from hydraulic_sysid.diagnosis.search.worth import (
 )
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.noise import code_step
-from hydraulic_sysid.estimation.parameters import bounded, scale
+from hydraulic_sysid.estimation.parameters import Parameters, bounded, scale
 from hydraulic_sysid.estimation.segments import cut, segment_length
 
 DT = 1e-3
@@ -185,7 +185,7 @@ def test_a_parameter_whose_value_and_default_are_zero_has_a_scale(model) -> None
 def state(model, total: float, refits: dict[str, float]) -> SearchState:
     """A state with that sum of squares, and those of its refits."""
     found = [CandidateRefit(name, None, at(left)) for name, left in refits.items()]  # type: ignore[arg-type]
-    nowhere = SimpleNamespace(split=Split([], []))
+    nowhere = SimpleNamespace(split=Split([], []), parameters=Parameters.unbounded(np.zeros(0)), model=model)
     return SearchState(model, nowhere, at(total), [], found)  # type: ignore[arg-type]
 
 
@@ -378,6 +378,16 @@ def test_an_effect_on_whose_size_segments_disagree_is_not_named(model, left: flo
     assert "sizes of constant_load that differ by more than it is" in verdict.sentences(
         found, verdict.Verdict(verdict.OUTSIDE, ["constant_load"], {}, {}), []
     )
+
+
+def test_no_further_effect_is_named_on_whose_size_segments_disagree(model, monkeypatch: pytest.MonkeyPatch) -> None:
+    first, both = model.with_effect("valve_deadband"), model.with_effect("valve_deadband").with_effect("sensor_lag")
+    base, one, final = state(model, 60000.0, {}), state(first, 20000.0, {}), state(both, 3100.0, {})
+    misfits = {"valve_deadband": one.misfit, "sensor_lag": final.misfit}
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {"sensor_lag": one})
+    assert decisive(found).added == ["valve_deadband", "sensor_lag"]
+    monkeypatch.setattr(worth, "may_be_nothing", lambda at, effect: effect.name == "sensor_lag")
+    assert decisive(found).added == ["valve_deadband"] and decisive(found).final is one
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from .candidates import observed, subsystem
 from .competing_models import competing_models
 from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material
 from .search_state import SearchResult, SearchState
+from .uncertainty import may_be_nothing
 
 FAR = 5.0  # times what the best leaves: what leaves more comes not near it
 FURTHER = 0.25  # of what is left, which a further effect must explain, unless it explains a good part of all
@@ -153,15 +154,17 @@ def decisive(found: SearchResult) -> SearchResult:
 
     None where they take nothing off what was left (they did while noise was judged without them), or nothing was left
     before (a converter's steps, whose size every record shows, below its noise), or so little that nothing need be
-    missing and they leave much of that; no further one without which nothing is left either, and none that explains
-    little and may as well be something of another subsystem: that is how far laws are off those of the bench.
+    missing and they leave much of that; no further one without which nothing is left either, none that explains little
+    and may as well be something of another subsystem: that is how far laws are off those of the bench; and none on
+    whose size segments disagree by more than it is.
     """
     base, final = found.base.misfit, found.final.misfit
     vain = not material(base, final) or nothing_gained(base, final)
     if found.added and (vain or leaves_most(base, final, found.base.immaterial)):
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
-        if needless(found, name) or vague(found, name):
+        nothing = may_be_nothing(found.final.linearisation, found.model.library[name])
+        if needless(found, name) or vague(found, name) or nothing:
             misfits = {other: misfit for other, misfit in found.misfits.items() if other != name}
             competing = {other: state for other, state in found.competing.items() if other != name}
             without = found.competing[name]
