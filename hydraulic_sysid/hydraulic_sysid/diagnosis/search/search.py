@@ -22,6 +22,7 @@ from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.refinement import outlying
 
 from .candidate_fits import LATER_REFITS
+from .data_sheet import tolerances
 from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
@@ -89,7 +90,8 @@ class Search(RecordingFits):
                 self._show(found.base, found.base.scores, found.base.refits)
             found = self.with_drift(found)
             at = found.final.linearisation
-            disputed = bool(found.added) and may_be_nothing(at, at.model.library[found.added[0]])
+            first = [at.model.library[name] for name in found.added[:1]]
+            disputed = any(may_be_nothing(at, effect, tolerances(found.model)) for effect in first)
             return replace(found, disputed=disputed)
         except (OutOfTimeError, KeyboardInterrupt):
             if not self.path:

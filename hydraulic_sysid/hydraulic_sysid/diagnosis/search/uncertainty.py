@@ -79,13 +79,15 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
     return found
 
 
-def may_be_nothing(at: Linearisation, effect: Effect) -> bool:
+def may_be_nothing(at: Linearisation, effect: Effect, tolerances: Mapping[str, float]) -> bool:
     """Whether an effect of a fitted model may as well be absent: every interval of a size of it holds its null value.
 
     A law that is there has much the same size in all segments; one that only follows what another does has not, and
     then its error by their scatter is as large as it is. One at a bound is no matter of that.
+
+    :param tolerances: as of `parameter_errors`
     """
-    known = parameter_errors(at)
+    known = parameter_errors(at, tolerances)
     nulls = {f"{effect.name}.{p.name}": p.null for p in effect.parameters if p.null is not None}
     sized = {key: null for key, null in nulls.items() if key in known}
     return bool(sized) and all(
