@@ -386,7 +386,7 @@ def test_no_further_effect_is_named_on_whose_size_segments_disagree(model, monke
     misfits = {"valve_deadband": one.misfit, "sensor_lag": final.misfit}
     found = SearchResult(model, Split([], []), FitSettings(), base, final, misfits, {"sensor_lag": one})
     assert decisive(found).added == ["valve_deadband", "sensor_lag"]
-    monkeypatch.setattr(worth, "may_be_nothing", lambda at, effect, _: effect.name == "sensor_lag")
+    monkeypatch.setattr(worth, "may_be_nothing", lambda at, effect: effect.name == "sensor_lag")
     assert decisive(found).added == ["valve_deadband"] and decisive(found).final is one
 
 
@@ -409,7 +409,7 @@ def test_an_interval_that_holds_nothing(
     }
     monkeypatch.setattr(uncertainty, "parameter_errors", lambda at, _: known)
     at: Any = SimpleNamespace(model=with_it)
-    assert uncertainty.may_be_nothing(at, with_it.library["structural_flexibility"], {}) is nothing
+    assert uncertainty.may_be_nothing(at, with_it.library["structural_flexibility"]) is nothing
 
 
 @pytest.mark.parametrize("exponent", [1.2, 1.4])

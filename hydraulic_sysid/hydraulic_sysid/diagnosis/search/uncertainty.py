@@ -79,7 +79,7 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
     return found
 
 
-def may_be_nothing(at: Linearisation, effect: Effect, tolerances: Mapping[str, float]) -> bool:
+def may_be_nothing(at: Linearisation, effect: Effect, tolerances: Mapping[str, float] = EXACT) -> bool:
     """Whether an effect of a fitted model may as well be absent: every interval of a size of it holds its null value.
 
     A law that is there has much the same size in all segments; one that only follows what another does has not, and

@@ -11,7 +11,6 @@ from hydraulic_sim.errors import SimulationError
 
 from .candidates import observed, subsystem
 from .competing_models import competing_models
-from .data_sheet import tolerances
 from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material
 from .search_state import SearchResult, SearchState
 from .uncertainty import may_be_nothing
@@ -164,7 +163,7 @@ def decisive(found: SearchResult) -> SearchResult:
     if found.added and (vain or leaves_most(base, final, found.base.immaterial)):
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
-        nothing = may_be_nothing(found.final.linearisation, found.model.library[name], tolerances(found.model))
+        nothing = may_be_nothing(found.final.linearisation, found.model.library[name])
         if needless(found, name) or vague(found, name) or nothing:
             misfits = {other: misfit for other, misfit in found.misfits.items() if other != name}
             competing = {other: state for other, state in found.competing.items() if other != name}
