@@ -367,19 +367,6 @@ def test_a_law_that_fits_only_bent_to_its_limits_is_not_named(model, damping: fl
     assert verdict.kind_of(found, tied=tied) == kind
 
 
-@pytest.mark.parametrize(("left", "kind"), [(3900.0, verdict.OUTSIDE), (3010.0, verdict.MISSING)])
-def test_an_effect_on_whose_size_segments_disagree_is_not_named(model, left: float, kind: str) -> None:
-    """Where more than noise is left: it only follows what another does."""
-    base, final = state(model, 30000.0, {}), state(model.with_effect("constant_load"), left, {})
-    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
-    assert verdict.kind_of(found, tied=False) == verdict.MISSING
-    found = replace(found, disputed=True)
-    assert verdict.kind_of(found, tied=False) == kind
-    assert "sizes of constant_load that differ by more than it is" in verdict.sentences(
-        found, verdict.Verdict(verdict.OUTSIDE, ["constant_load"], {}, {}), []
-    )
-
-
 def test_no_further_effect_is_named_on_whose_size_segments_disagree(model, monkeypatch: pytest.MonkeyPatch) -> None:
     first, both = model.with_effect("valve_deadband"), model.with_effect("valve_deadband").with_effect("sensor_lag")
     base, one, final = state(model, 60000.0, {}), state(first, 20000.0, {}), state(both, 3100.0, {})
@@ -407,7 +394,7 @@ def test_an_interval_that_holds_nothing(
         "structural_flexibility.mass": Known(0.5 * mass, mass, at_bound),
         "structural_flexibility.damping": Known(0.1, 0.2, None),  # a shape has no size
     }
-    monkeypatch.setattr(uncertainty, "parameter_errors", lambda at, _: known)
+    monkeypatch.setattr(uncertainty, "parameter_errors", lambda at: known)
     at: Any = SimpleNamespace(model=with_it)
     assert uncertainty.may_be_nothing(at, with_it.library["structural_flexibility"]) is nothing
 

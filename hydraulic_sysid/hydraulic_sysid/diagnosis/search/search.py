@@ -22,7 +22,6 @@ from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.refinement import outlying
 
 from .candidate_fits import LATER_REFITS
-from .data_sheet import tolerances
 from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
@@ -36,7 +35,6 @@ from .score_test import CandidateScore, score
 from .search_state import SearchResult, SearchState
 from .set_aside import accidents
 from .spectral_lines import record_features
-from .uncertainty import may_be_nothing
 from .worth import (
     FURTHER,
     MOSTLY,
@@ -88,11 +86,7 @@ class Search(RecordingFits):
             found = accidents_named(self.by_force(concluded))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)
-            found = self.with_drift(found)
-            at = found.final.linearisation
-            first = [at.model.library[name] for name in found.added[:1]]
-            disputed = any(may_be_nothing(at, effect, tolerances(found.model)) for effect in first)
-            return replace(found, disputed=disputed)
+            return self.with_drift(found)
         except (OutOfTimeError, KeyboardInterrupt):
             if not self.path:
                 raise

@@ -110,8 +110,6 @@ class SearchResult:
     drift: Drift | None = None
     by_force: ForceShare | None = None
     """What the one effect added explains of the force that was left; where that, not the residual, has named it."""
-    disputed: bool = False
-    """Whether segments disagree so much on the size of the first effect added that it may as well be nothing."""
     stopped: bool = False
     """Whether it ended before it was done: then ``final`` is the best so far, the data sheet still loose."""
 

@@ -79,15 +79,13 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
     return found
 
 
-def may_be_nothing(at: Linearisation, effect: Effect, tolerances: Mapping[str, float] = EXACT) -> bool:
+def may_be_nothing(at: Linearisation, effect: Effect) -> bool:
     """Whether an effect of a fitted model may as well be absent: every interval of a size of it holds its null value.
 
     A law that is there has much the same size in all segments; one that only follows what another does has not, and
     then its error by their scatter is as large as it is. One at a bound is no matter of that.
-
-    :param tolerances: as of `parameter_errors`
     """
-    known = parameter_errors(at, tolerances)
+    known = parameter_errors(at)
     nulls = {f"{effect.name}.{p.name}": p.null for p in effect.parameters if p.null is not None}
     sized = {key: null for key, null in nulls.items() if key in known}
     return bool(sized) and all(

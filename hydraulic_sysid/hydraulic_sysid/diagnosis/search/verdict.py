@@ -163,8 +163,6 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
         return OUTSIDE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
-    if result.disputed:
-        return OUTSIDE
     no_law = bool(curves) and all(c.share < UNATTRIBUTED for c in curves)
     details = final.variance < SMALL or no_law
     if final.usual > RIGHT and any(c.share > SHOWN for c in curves):
@@ -303,8 +301,6 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     text = f"Outside the library: {none if drift is None else f'{_changes(result, drift)}, as no effect does'}. "
     if result.added:
         text += f"The nearest is {_and(result.added)}. {fell} "
-        if result.disputed:
-            text += f"Segments ask for sizes of {result.added[0]} that differ by more than it is. "
     else:
         text += f"On validation data the residual is {final:.3g} × noise. "
     best = curves[0] if curves and drift is None else elsewhere(result, curves)
