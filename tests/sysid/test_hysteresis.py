@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hydraulic_sim import registry
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
+from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.proposed_effect import propose
 from hydraulic_sysid.diagnosis.search import add
 from hydraulic_sysid.diagnosis.search.diagnosis import Remaining
 from hydraulic_sysid.diagnosis.search.force_curves import Forces
 from hydraulic_sysid.diagnosis.search.search import Search
-from hydraulic_sysid.estimation.fit import FitSettings
+from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, evaluate
 from hydraulic_sysid.estimation.parameters import Parameters
 
 MODEL = """format: hydraulic-model-1
@@ -122,6 +125,25 @@ EFFECT = Effect(
     assert bare is not None and beside is not None
     assert beside.values["viscous_friction.coefficient"] == pytest.approx(VISCOUS, rel=0.03)
     assert bare.values["viscous_friction.coefficient"] > 1.5 * VISCOUS
+
+
+def test_no_forces_where_the_model_does_not_run(
+    model: Model, records: list[Record], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def track(*_: Any) -> None:
+        raise SimulationError("propagation along the record failed")
+
+    segments = Search.of(model, records, (), SETTINGS, lambda _: None).split.segments
+    monkeypatch.setattr(Plant, "track", track)
+    assert Forces.of(model, Parameters.of(model, model.free_keys()), segments) is None
+
+
+def test_a_fit_says_that_a_run_leaves_all_bounds(
+    model: Model, records: list[Record], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FitPoint, "cost", np.inf)
+    with pytest.raises(SimulationError, match="'late' leaves all bounds from where the records show its states"):
+        evaluate(model, records, SETTINGS)
 
 
 @pytest.mark.parametrize("effect", ["position_loop", "command_delay"])

@@ -29,8 +29,9 @@ from hydraulic_sysid.diagnosis.proposed_effect.laws import (
     spline,
 )
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES, WITH_MEMORY
-from hydraulic_sysid.diagnosis.search.nonparametric_curves import Place
+from hydraulic_sysid.diagnosis.search.nonparametric_curves import Place, curve_normal
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
+from hydraulic_sysid.estimation.parameters import Parameters
 
 SIGNALS = {
     "position": 0.13, "velocity": -0.07, "pressure_a": 6e6, "pressure_b": 4.5e6, "pressure_difference": 1.5e6,
@@ -193,6 +194,59 @@ def test_a_curve_begins_with_the_part_of_it_that_leaves_least(costs, expected, m
             proposal.begun(part, model, [key], [key], {})
     else:
         assert proposal.begun(part, model, [key], [key], {}).value(key) == pytest.approx(50.0 * expected)
+
+
+def test_no_leak_flows_uphill(tmp_path: Path) -> None:
+    """Where a bounded leakage of the model is all that holds a uniform one, a fit would go anywhere."""
+    hat = load_effect(next(f for f in FILES if f.stem == "unknown_conductance")).effect
+    fitted = FittedLaw(spline(3), np.array([-6e-11, 0.0, 2e-11]), (), 1.0, -1.0, np.array([0.0, 1.0, 2.0]))
+    path = tmp_path / "written.py"
+    path.write_text(effect_text(place(hat, "position"), fitted, (0.0, 2.0), "Evidence.", ["a"]))
+    heights = load_effect(path).effect.parameters
+    assert [p.default for p in heights] == [0.0, 0.0, 2e-11]
+    assert all(p.bounds[0] == 0.0 < p.bounds[1] for p in heights)
+
+
+@pytest.mark.parametrize(("low", "high", "left"), [(0.9, 1.1, 300.0), (-np.inf, np.inf, 0.0)])
+def test_no_curve_does_what_a_bounded_parameter_could_undo(low: float, high: float, left: float) -> None:
+    """A uniform curve and a parameter that do the same: only where that may be anything nothing is known of the curve.
+
+    Between its bounds it has a variance of a twelfth of their distance squared.
+    """
+    one = np.ones(1)
+    parameters = Parameters(("level",), one, one, low * one, high * one, 0.0 * one, np.inf * one, np.inf * one)
+    every = np.full((4, 4), 1e9)  # of the parameter and, alike, of three heights together
+    normal = NormalEquations(every, (np.zeros((1, 4)),))
+    at: Any = SimpleNamespace(changes=lambda plants: [], bordered=lambda columns: normal, parameters=parameters)
+    hat = load_effect(next(f for f in FILES if f.stem == "unknown_force")).effect
+    plant: Any = SimpleNamespace(with_parameters=lambda values: None)
+    found = curve_normal(at, Place(plant, hat, 0, "velocity", np.zeros(0)), np.array([0.0, 1.0, 2.0]))
+    assert found is not None and found.information == pytest.approx(np.full((3, 3), left), rel=1e-3, abs=1e-3)
+
+
+@pytest.mark.parametrize(("cost", "holds"), [(140.0, True), (160.0, False), (None, False)])
+def test_a_law_must_explain_what_its_curve_does(
+    cost: float | None, holds: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the 1000 that were left the curve leaves 50: nine tenths of what it explains are 855."""
+    model = load_model("sample_bench")
+    hat = load_effect(next(f for f in FILES if f.stem == "unknown_force")).effect
+
+    def begin(*_: Any, **__: Any) -> SimpleNamespace:
+        if cost is None:
+            raise SimulationError("does not run")
+        return SimpleNamespace(cost=cost)
+
+    monkeypatch.setattr(proposal, "FitPoint", SimpleNamespace(begin=begin))
+    monkeypatch.setattr(proposal, "Plant", SimpleNamespace(for_fits=lambda model: model))
+    part: Any = SimpleNamespace(
+        model=model, parameters=Parameters.of(model, ["moving_mass"]), costs=[np.array([600.0, 400.0])],
+        split=SimpleNamespace(segments=[]),
+    )  # fmt: skip
+    at = replace(place(hat, "position"), values=np.array([-0.2, 0.2]))
+    law = proposal.Candidate(at, np.zeros(0), FittedLaw(SHORT[0], np.array([100.0]), (), 1.0, -1.0))
+    fit: Any = SimpleNamespace(at=SimpleNamespace(model=model), cost=50.0)
+    assert proposal.holds(part, fit, law, tmp_path / "law" / "own_effect.py", ["a"]) is holds
 
 
 def test_the_name_of_a_record_runs_nothing(tmp_path: Path) -> None:

@@ -140,7 +140,7 @@ def propose(
     with tempfile.TemporaryDirectory() as folder:
         found = list[_Fit]()
         for number, candidate in enumerate(_worth_fitting(part, curves, say)):
-            if any(_cost(part) - f.cost > PLENTY * unexplained(part) for f in found):
+            if any(_explained(part, f) > PLENTY for f in found):
                 break
             say(f"fitting a curve over {candidate.words}")
             with suppress(HydraulicError):  # the plant does not run with it
@@ -148,12 +148,12 @@ def propose(
         if not found:
             return None
         first = min(found, key=lambda f: f.cost)
-        share = min((_cost(part) - first.cost) / max(unexplained(part), 1e-300), 1.0)
+        share = min(_explained(part, first), 1.0)
         if share < LEAST:
             return None
         say(f"the law over {first.candidate.words}")
         final = _law(first)
-        if final is None or not _holds(part, first, final, Path(folder) / "law" / f"{name}.py", records):
+        if final is None or not holds(part, first, final, Path(folder) / "law" / f"{name}.py", records):
             final = first.candidate
     effect = final.place.effect
     evidence = (
@@ -171,23 +171,21 @@ def _worth_fitting(
     """Curves that are fitted one after the other, until one explains `PLENTY`."""
     if drives_by_force(part.model):
         say("curves of the force that the motion asks for")
-        yield from by_force(part)
+        yield from _by_force(part)
     yield from _candidates(part, curves, say)[:MOST_FITTED]
     late = None if drives_by_force(part.model) else _with_memory(part, say)
     if late is not None:
         yield late
 
 
-def by_force(part: Linearisation) -> list[Candidate]:
+def _by_force(part: Linearisation) -> list[Candidate]:
     """The best curves over the motion as it is and as it was, by the forces that records ask for."""
     forces = Forces.of(part.model, part.parameters, part.split.segments)
     if forces is None:
         return []
-    dt = min(s.record.dt for s in part.split.segments)
-    silent: Callable[[str], None] = lambda _: None  # noqa: E731
     kinds = (
-        [p for p in places(part, silent, FORCES) if p.variable in MOTION],
-        list(places_with_memory(part, silent, [n * dt for n in FORCE_LAGS])),
+        [p for p in places(part, names=FORCES) if p.variable in MOTION],
+        list(places_with_memory(part, _lags(part, FORCE_LAGS))),
     )
     best = [max((_curve_by_force(forces, p) for p in kind), key=lambda c: c.share) for kind in kinds if kind]
     return [
@@ -210,7 +208,7 @@ def _candidates(
     wanted = {(c.place, c.variable) for c in curves[: 2 * MOST_FITTED]}
     periodic = set(PERIODIC_PLACES) if curves[0].share < CLEAR else set()
     found = []
-    for place in places(part, lambda _: None):
+    for place in places(part):
         if place.key in wanted:
             found.append(_candidate(part, place, FINE))
         if place.key in periodic:
@@ -223,10 +221,14 @@ def _candidates(
 def _with_memory(part: Linearisation, say: Callable[[str], None]) -> Candidate | None:
     """The best place for a curve that remembers."""
     sample, _ = part.sample(ENOUGH)
-    dt = min(s.record.dt for s in part.split.segments)
-    rough = [(curve(sample, place), place) for place in places_with_memory(sample, say, [n * dt for n in LAGS])]
+    rough = [(curve(sample, place), place) for place in places_with_memory(sample, _lags(part, LAGS), say)]
     found = [(c.reduction, number) for number, (c, _) in enumerate(rough) if c is not None]
     return _candidate(part, rough[max(found)[1]][1], FINE) if found else None
+
+
+def _lags(part: Linearisation, samples: Sequence[float]) -> list[float]:
+    """So many sampling intervals [s], of the record with the shortest."""
+    return [n * min(s.record.dt for s in part.split.segments) for n in samples]
 
 
 def _candidate(part: Linearisation, place: Place, number: int) -> Candidate | None:
@@ -252,11 +254,9 @@ def _in_units(fitted: FittedLaw, place: Place) -> FittedLaw:
 def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequence[str]) -> _Fit:
     """A candidate's law in the model, fitted with all else that is free, and held there."""
     place, fitted, name = candidate.place, candidate.fitted, file.stem
-    file.parent.mkdir()
-    file.write_text(effect_text(place, fitted, _extent(place.values), "A first fit.", records))
     # The hat function is needed when the law is taken: compiled once for both.
     hat = [f for f in (*FILES, *WITH_MEMORY) if f.stem == place.effect.name]
-    model = replace(part.model, user_effects=(*part.model.user_effects, *hat, file)).with_effect(name)
+    model = _with_law(part, candidate, file, records, hat)
     own = [f"{name}.{p}" for p in (*fitted.law.coefficients, *fitted.law.shapes, *place.shape)]
     number = len(fitted.law.coefficients)
     keys, priors = (*part.parameters.keys, *own), _priors(part)
@@ -272,18 +272,25 @@ def _fitted(part: Linearisation, candidate: Candidate, file: Path, records: Sequ
     return _Fit(replace(candidate, place=there, fitted=now), at, _cost(at), now.values(candidate.knots))
 
 
-def _holds(part: Linearisation, fit: _Fit, law: Candidate, file: Path, records: Sequence[str]) -> bool:
+def holds(part: Linearisation, fit: _Fit, law: Candidate, file: Path, records: Sequence[str]) -> bool:
     """Whether a law that was taken from a fitted curve explains in the model `HOLDS` of what the curve does."""
-    file.parent.mkdir()
-    file.write_text(effect_text(law.place, law.fitted, _extent(law.place.values), "A law.", records))
     keys = part.parameters.keys
-    model = replace(part.model, user_effects=(*part.model.user_effects, file)).with_effect(file.stem)
-    model = model.with_values({key: fit.at.model.value(key) for key in keys})
+    model = _with_law(part, law, file, records).with_values({key: fit.at.model.value(key) for key in keys})
     try:
         begin = FitPoint.begin(Plant.for_fits(model), part.split.segments, keys, priors=_priors(part))
     except HydraulicError:  # it does not run
         return False
     return _cost(part) - begin.cost > HOLDS * (_cost(part) - fit.cost)
+
+
+def _with_law(
+    part: Linearisation, candidate: Candidate, file: Path, records: Sequence[str], others: Sequence[Path] = ()
+) -> Model:
+    """The model with a candidate's law on, written to a ``file``; the library has ``others`` as well."""
+    place = candidate.place
+    file.parent.mkdir()
+    file.write_text(effect_text(place, candidate.fitted, _extent(place.values), "On trial.", records))
+    return replace(part.model, user_effects=(*part.model.user_effects, *others, file)).with_effect(file.stem)
 
 
 def begun(part: Linearisation, model: Model, heights: Sequence[str], keys: Sequence[str], priors: Priors) -> Model:
@@ -303,6 +310,11 @@ def begun(part: Linearisation, model: Model, heights: Sequence[str], keys: Seque
     return models[min(costs, key=lambda share: costs[share])]
 
 
+def _explained(part: Linearisation, fit: _Fit) -> float:
+    """Of what noise does not explain, the share that a fitted curve does."""
+    return (_cost(part) - fit.cost) / max(unexplained(part), 1e-300)
+
+
 def _cost(at: Linearisation) -> float:
     return sum(float(c.sum()) for c in at.costs)
 
@@ -315,11 +327,10 @@ def _priors(part: Linearisation) -> Priors:
 def _law(fit: _Fit) -> Candidate | None:
     """The candidate with the law that explains most where it was fitted."""
     place, knots = fit.candidate.place, fit.candidate.knots
-    silent: Callable[[str], None] = lambda _: None  # noqa: E731
     if place.shape:
-        every = places_with_memory(fit.at, silent, place.shape.values())
+        every = places_with_memory(fit.at, place.shape.values())
     else:
-        every = places(fit.at, silent, (place.effect.name,))
+        every = places(fit.at, names=(place.effect.name,))
     here = next((p for p in every if p.key == place.key), None)
     normal = None if here is None else curve_normal(fit.at, here, knots)
     if normal is None:

@@ -87,7 +87,7 @@ def force_shares(model: Model, records: Sequence[Record], scores: Sequence[Candi
         if np.mean(noise**2) < NOISY * bare.left:
             break
     half = np.arange(force.size) // max(round(BLOCK * rate), 1) % 2 == 0
-    without, unexplained = model.with_values(_values(free, bare.change), source=SOURCE), bare.held_out(half)
+    without, unexplained = model.with_values(free.moved(bare.change).by_key, source=SOURCE), bare.held_out(half)
     found = []
     for one in (s for s in scores if follows_from_motion(s.effect)):
         for start in ({}, one.start, *one.others):
@@ -96,7 +96,7 @@ def force_shares(model: Model, records: Sequence[Record], scores: Sequence[Candi
             if not np.any(column):
                 continue
             fit = bare.beside(column, one.effect)
-            values = {**_values(free, fit.change), **_sized(other, one.effect, float(fit.change[-1]))}
+            values = {**free.moved(fit.change[:-1]).by_key, **_sized(other, one.effect, float(fit.change[-1]))}
             done, share = other.with_values(values, source=SOURCE), 1.0 - fit.held_out(half) / unexplained
             found.append(ForceShare(one.effect.name, share, bare.left**0.5, without, done))
     best = {f.name: f for f in sorted(found, key=lambda f: f.share)}
@@ -140,12 +140,6 @@ class _Fit:
             change = _Fit.of(self.columns[seen], self.force[seen], self.low, self.high).change
             total += float(np.sum((self.force[~seen] + self.columns[~seen] @ change) ** 2))
         return total / self.force.size
-
-
-def _values(free: Parameters, change: Array) -> dict[str, float]:
-    """Values of the ``free`` parameters (P,) after a change of so many scales (P, …)."""
-    moved = np.clip(free.values + free.scales * change[: len(free)], free.low, free.high)
-    return dict(zip(free.keys, moved.tolist(), strict=True))
 
 
 def _sized(model: Model, effect: Effect, times: float) -> dict[str, float]:

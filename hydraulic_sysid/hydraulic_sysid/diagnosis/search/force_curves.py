@@ -10,23 +10,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from hydraulic_sim.arrays import Array, Index, Mask
+from hydraulic_sim.effect import arguments
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.diagnosis.locate.basis import hat_functions
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.segments import Segments
 
-from .force_balance import drives_by_force
+from .force_balance import BLOCK, STEP, drives_by_force
 from .nonparametric_curves import Place
 
 RATE = 400.0  # samples per second that are looked at
-STEP = 1e-3  # difference step of a parameter, of its scale
-BLOCK = 0.5  # s: one of two has the values by which the other is judged
 SMOOTH = 0.03  # of what a column is: weight of second differences of a curve, which decides where nothing is seen
 
 
@@ -61,7 +62,10 @@ class Forces:
 
     @classmethod
     def of(cls, model: Model, free: Parameters, segments: Sequence[Segments]) -> Forces | None:
-        """None where the drive is not the force, or passes a law with a memory first, or no parameter is free."""
+        """None where the drive is not the force, or passes a law with a memory first, or no parameter is free.
+
+        None, too, where the model does not run along a record.
+        """
         late = any(model.library[name].slot == "command" for name in model.effects)
         if late or not len(free) or not drives_by_force(model):
             return None
@@ -69,7 +73,10 @@ class Forces:
         moved = (free.values + STEP * free.scales).tolist()
         plants = [plant, *(plant.with_parameters({k: v}) for k, v in zip(free.keys, moved, strict=True))]
         kept = [np.arange(0, len(s.record), max(round(1.0 / (RATE * s.record.dt)), 1)) for s in segments]
-        found = [_forces(plants, s, own) for s, own in zip(segments, kept, strict=True)]
+        try:
+            found = [_forces(plants, s, own) for s, own in zip(segments, kept, strict=True)]
+        except SimulationError:
+            return None
         given, direction = (np.concatenate(part) for part in zip(*found, strict=True))
         half = np.concatenate([own * s.record.dt // BLOCK % 2 == 0 for own, s in zip(kept, segments, strict=True)])
         begin = np.cumsum([0, *(len(s.record) for s in segments)])
@@ -79,22 +86,21 @@ class Forces:
     def curve(self, place: Place, knots: Array) -> ForceCurve:
         """The curve there."""
         hats = hat_functions(place.values[self.kept], knots).T
-        if place.effect.kernel.__globals__["RETURNS"] == "-law * direction":
+        if "direction" in arguments(place.effect.kernel):
             hats = hats * self.direction[:, None]
-        columns = np.column_stack((self.columns, hats))
-        change, left = self._solved(columns)
-        bare = self._solved(self.columns)[1]
-        return ForceCurve(place, knots, change[len(self.free) :], self._values(change), 1.0 - left / bare)
+        change, left = self._solved(np.column_stack((self.columns, hats)))
+        own, heights = np.split(change, [len(self.free)])
+        return ForceCurve(place, knots, heights, self.free.moved(own).by_key, 1.0 - left / self._bare[1])
 
     @property
     def values(self) -> dict[str, float]:
         """Of the free parameters as the forces ask for."""
-        return self._values(self._solved(self.columns)[0])
+        return self.free.moved(self._bare[0]).by_key
 
-    def _values(self, change: Array) -> dict[str, float]:
-        free = self.free
-        moved = np.clip(free.values + free.scales * change[: len(free)], free.low, free.high)
-        return dict(zip(free.keys, moved.tolist(), strict=True))
+    @cached_property
+    def _bare(self) -> tuple[Array, float]:
+        """As `_solved`, by the free parameters alone."""
+        return self._solved(self.columns)
 
     def _solved(self, columns: Array) -> tuple[Array, float]:
         """What of the columns (n, P + K) gives the force (P + K,), and the mean square of each half by the other [N²].
@@ -103,8 +109,7 @@ class Forces:
         """
         free, number = self.free, columns.shape[1] - len(self.free)
         far = np.full(number, np.inf)
-        low = np.concatenate(((free.low - free.values) / free.scales, -far))
-        high = np.concatenate(((free.high - free.values) / free.scales, far))
+        low, high = (np.concatenate(ends) for ends in zip(free.reach, (-far, far), strict=True))
         bend = np.zeros((max(number - 2, 0), columns.shape[1]))
         if number > 2:
             size = SMOOTH * float(np.linalg.norm(columns[:, len(free) :], axis=0).max())

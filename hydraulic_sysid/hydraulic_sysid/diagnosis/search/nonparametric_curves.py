@@ -86,7 +86,9 @@ def nonparametric_curves(at: Linearisation, say: Callable[[str], None]) -> list[
     return sorted((c for c in found if c is not None), key=lambda c: -c.reduction)
 
 
-def places(at: Linearisation, say: Callable[[str], None], names: Container[str] | None = None) -> Iterator[Place]:
+def places(
+    at: Linearisation, say: Callable[[str], None] = lambda _: None, names: Container[str] | None = None
+) -> Iterator[Place]:
     """Those that the plant has, with every variable that the records show and that moves.
 
     :param names: of the places that are asked for; fewer compile faster (default: all)
@@ -99,7 +101,9 @@ def places(at: Linearisation, say: Callable[[str], None], names: Container[str] 
                 yield Place(plant, effect, number, variable, np.concatenate([values[variable] for values in seen]))
 
 
-def places_with_memory(at: Linearisation, say: Callable[[str], None], lags: Iterable[float]) -> Iterator[Place]:
+def places_with_memory(
+    at: Linearisation, lags: Iterable[float], say: Callable[[str], None] = lambda _: None
+) -> Iterator[Place]:
     """Those over a variable that follows one of the motion late, with each of these time constants [s]."""
     tried, seen = list(lags), _all_seen(at)
     for plant, effect in _extended(at, WITH_MEMORY, say):

@@ -163,8 +163,8 @@ def decisive(found: SearchResult) -> SearchResult:
     if found.added and (vain or leaves_most(base, final, found.base.immaterial)):
         return replace(found, final=found.base, misfits={}, competing={})
     for name in reversed(found.added[1:]):
-        nothing = may_be_nothing(found.final.linearisation, found.model.library[name])
-        if needless(found, name) or vague(found, name) or nothing:
+        effect = found.model.library[name]
+        if needless(found, name) or vague(found, name) or may_be_nothing(found.final.linearisation, effect):
             misfits = {other: misfit for other, misfit in found.misfits.items() if other != name}
             competing = {other: state for other, state in found.competing.items() if other != name}
             without = found.competing[name]

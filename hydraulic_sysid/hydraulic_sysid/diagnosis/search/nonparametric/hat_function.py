@@ -23,8 +23,8 @@ def effect(
     """An effect whose kernel takes over, centre, width and height of a hat function.
 
     Summary and equation are the first two paragraphs of the file's docstring; ``size``, which is tried, and ``most``,
-    its bound, are in ``unit``; ``shape``: parameters besides; ``passive``: it may not be
-    negative, since that would feed itself, as a leak that flows uphill; ``more``: fields of the effect.
+    its bound, are in ``unit``; ``shape``: parameters besides; ``passive``: it may not be negative, since that would
+    feed itself, as a leak that flows uphill; ``more``: fields of the effect.
     """
     least = 0.0 if passive else -most
     summary, equation, *_ = inspect.cleandoc(kernel.__globals__["__doc__"]).split("\n\n")
