@@ -88,6 +88,9 @@ def test_a_force_that_answers_late_is_proposed_with_its_lag(model: Model, record
     found = propose(Remaining.of(search.begin().linearisation), "late", ["slow", "fast"])
     assert found is not None and (found.place, found.variable) == ("unknown_lagging_force", "lagged_velocity")
     assert found.share > 0.9
+    shown = found.row  # as the page draws it
+    assert shown["lag"] == pytest.approx(LAG, rel=0.1) and shown["unit"] == "N"
+    assert np.ptp(shown["value"]) == pytest.approx(2.0 * LEVEL, rel=0.1)
     file = tmp_path / "late.py"
     file.write_text(found.text)
     test = [record("test", 2.4, 3.0, 3)]

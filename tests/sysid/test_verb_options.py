@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import html
+import re
+import shlex
 from pathlib import Path
 
 import pytest
 
-from hydraulic_sysid.verbs import bandwidth, calibrate, diagnose
+from hydraulic_sysid.verbs import _options, bandwidth, calibrate, compare, diagnose
 
 SAMPLE = Path(__file__).resolve().parents[2] / "examples" / "sample_bench"
 
@@ -29,3 +32,27 @@ def test_a_model_is_never_overwritten(
     assert verb.main([*arguments, *more]) == 2  # type: ignore[attr-defined]
     assert f"{tmp_path / there} exists; choose another folder (a model is never overwritten)" in capsys.readouterr().err
     assert (tmp_path / there).read_text() == "mine"
+
+
+def test_what_the_page_suggests_reads_the_same(tmp_path: Path) -> None:
+    columns = tmp_path / "my map.yaml"
+    channels = "drive: {column: command_V, unit: V}, position: {column: position_m, unit: m}"
+    columns.write_text("time: {column: time_s, unit: s}\nchannels: {" + channels + "}\n")
+    steps = str(SAMPLE / "steps.csv.gz")
+    reading = ["--record", steps, "--columns", str(columns), "--window", "1", "3"]
+    assert compare.main(["--model", "sample_bench", *reading, "--out", str(tmp_path / "run")]) == 0
+    page = html.unescape((tmp_path / "run" / "report.html").read_text())
+    calls = re.findall(r'<code class="call">python -m hydraulic_sysid (\w+) (.*?)</code>', page)
+    assert calls
+    for verb, call in calls:
+        wanted = ["--model", "sample_bench", "--record", steps, "--columns", str(columns), "--window", "1.0", "3.0"]
+        assert shlex.split(call)[: len(wanted)] == wanted, verb
+
+
+def test_records_segments_and_what_is_kept_back_are_read_again() -> None:
+    parser = _options.parser("diagnose", "a verb")
+    _options.add_diagnosis_options(parser)
+    named = ["--model", "m.yaml", "--record", "a.csv", "b.csv", "--segment", "0.12", "--holdout", "c.csv"]
+    given = {"record": ["a.csv", "b.csv"], "segment": 0.12, "holdout": ["c.csv"]}
+    assert _options.reading(parser.parse_args(named)) == {"reading": given}
+    assert _options.reading(_options.parser("design", "a verb").parse_args([])) == {}

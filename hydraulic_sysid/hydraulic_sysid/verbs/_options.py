@@ -85,7 +85,8 @@ def run(
             done = work(options, say)
             with finishing():
                 say("writing the report")
-                results.write_result(folder, done.result)
+                result = {**done.result, **reading(options)}
+                results.write_result(folder, result)
                 for name, write in done.files.items():
                     write(folder / name)
                 from hydraulic_sysid.report import write_page  # takes long to import, and --help needs none
@@ -160,6 +161,19 @@ def read_records(options: argparse.Namespace) -> list[Record]:
     records = paired(read_all(options.record, options.columns)) if options.record else []
     window = getattr(options, "window", None)
     return [r.window(*window) for r in records] if window else records
+
+
+def reading(options: argparse.Namespace) -> dict[str, Any]:
+    """The entry ``reading`` of a document: by option, which records the command line names and how they are read.
+
+    What the page suggests next is to read the same. Nothing where a verb or its call names none.
+    """
+    named = {name: getattr(options, name, None) for name in ("record", "columns", "window", "segment", "holdout")}
+    given = {name: value for name, value in named.items() if value is not None}
+    if not given.get("record"):
+        return {}
+    text = {k: [str(one) for one in v] for k, v in given.items() if isinstance(v, list) and k != "window"}
+    return {"reading": {**given, **text}}
 
 
 def read_kept_back(paths: list[Path] | None, options: argparse.Namespace) -> list[Record]:

@@ -63,6 +63,7 @@ FORCES, MOTION = ("unknown_force", "unknown_friction"), ("position", "velocity",
 """Where forces are, and over what they may be where the drive that answers to them is the force."""
 SHARES = (1.0, 0.3, 0.1)  # of a curve, from the best of which its fit begins: to first order it is often far too large
 _FORCE_KNOTS = 9
+_SHOWN = 101  # places at which a document has a law
 _FIRST = FitSettings(most_steps=8, least_gain=5e-3)
 _USUAL = (0.01, 0.99)  # quantiles of a variable between which a spline has its knots
 _EDGE = 0.02  # of the range of a variable, by which knots reach beyond it
@@ -73,7 +74,8 @@ class ProposedEffect:
     """A user effect: the ``text`` of its file, where it acts, and what it explains.
 
     ``share``: of what noise does not explain on the segments looked at (0…1); ``beside``: effects that have to be on
-    as well, as the diagnosis added them.
+    as well, as the diagnosis added them; ``value`` (N,) [``unit``] of the law at ``knots`` (N,) [the variable's unit],
+    which follows the motion ``lag`` [s] late.
     """
 
     name: str
@@ -83,7 +85,12 @@ class ProposedEffect:
     variable: str
     law: str
     share: float
-    beside: tuple[str, ...] = ()
+    beside: tuple[str, ...]
+    summary: str
+    unit: str
+    lag: float
+    knots: Array
+    value: Array
 
     @property
     def row(self) -> dict[str, Any]:
@@ -96,6 +103,11 @@ class ProposedEffect:
             "law": self.law,
             "explained_share": self.share,
             "beside": list(self.beside),
+            "summary": self.summary,
+            "unit": self.unit,
+            "lag": self.lag,
+            "knots": self.knots,
+            "value": self.value,
         }
 
 
@@ -160,9 +172,13 @@ def propose(
         f"Of what the model leaves beyond the noise, such a curve over the {final.words} explains {percent(share)}, "
         f"all free parameters refitted. {_others(curves, final.place)}"
     )
-    text = effect_text(final.place, final.fitted, _extent(final.place.values), evidence.strip(), records)
-    law = final.fitted.law.name
-    return ProposedEffect(name, text, effect.name, subsystem(effect), final.place.variable, law, share, tuple(beside))
+    place, fitted, extent = final.place, final.fitted, _extent(final.place.values)
+    knots = np.linspace(*extent, _SHOWN, dtype=np.float64)
+    return ProposedEffect(
+        name, effect_text(place, fitted, extent, evidence.strip(), records), effect.name, subsystem(effect),
+        place.variable, fitted.law.name, share, tuple(beside), effect.summary, place.height.unit,
+        place.shape.get("lag", 0.0), knots, fitted.values(knots),
+    )  # fmt: skip
 
 
 def _worth_fitting(

@@ -63,17 +63,19 @@ def segment(worst: Result) -> go.Figure:
 
 
 def nonparametric(curve: Result) -> go.Figure:
-    """A curve without a law behind it, with its 95 % band."""
+    """A curve, with its 95 % band where it has one: one without a law behind it, or the law that was proposed."""
     x_factor, x_unit = style.shown(UNITS.get(curve["variable"], "1"))
     y_factor, y_unit = style.shown(curve["unit"])
     x = style.values(curve["knots"], x_factor)
-    low, high, value = (style.values(curve[key], y_factor) for key in ("low", "high", "value"))
     panels = Panels(1)
-    band: dict[str, Any] = {"line": {"width": 0}, "hoverinfo": "skip"}
-    panels.line(0, x, high, **band)
-    panels.line(0, x, low, "95 % band", legend=True, fill="tonexty", fillcolor=style.BAND, **band)
-    look = {"mode": "lines+markers", "line": {"color": AFTER, "width": 2}}
-    panels.line(0, x, value, curve["summary"], legend=True, **look)
+    look: dict[str, Any] = {"line": {"color": AFTER, "width": 2}}
+    if "low" in curve:
+        band: dict[str, Any] = {"line": {"width": 0}, "hoverinfo": "skip"}
+        panels.line(0, x, style.values(curve["high"], y_factor), **band)
+        low = style.values(curve["low"], y_factor)
+        panels.line(0, x, low, "95 % band", legend=True, fill="tonexty", fillcolor=style.BAND, **band)
+        look["mode"] = "lines+markers"
+    panels.line(0, x, style.values(curve["value"], y_factor), curve["summary"], legend=True, **look)
     panels.x_axis(0, f"{curve['variable'].replace('_', ' ')} [{x_unit}]")
     panels.y_axis(0, f"{curve['summary'].removesuffix(' of any shape')}\n[{y_unit}]", zeroline=True)
     return panels.figure(340)
