@@ -114,17 +114,26 @@ def rhs(now, S, command, on, P, hydraulic, K, R, G, AUX):
     AUX[9] = direction; AUX[10] = pressure_tank
 
 
-@njit(RUN, cache=True, nogil=True, error_model="numpy")
-def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
+@njit("i8(f8[::1], f8, f8, f8[:, ::1], i8, f8, f8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1], f8[::1])",
+      cache=True, nogil=True, error_model="numpy")
+def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
     """Integrates X over len(drive) samples; Y[k] is what is seen at sample k. Returns the samples done.
 
+    Every so many samples, if any, the first states are set to what was seen of them; then Y is one row, written anew.
     A substep is at most max_step long, and max_turn over the fastest rate of the oil through the lands.
     failure: time, substeps in the failing sample (0: not finite, else: too stiff for the step)."""
     {constants1}
     {switches1}
     S = np.empty(NX); K = np.zeros(NX); R = np.zeros(NX - NR); G = np.zeros(NX - NR)
     slope = np.empty(NR); rates = np.empty(NX - NR); goals = np.empty(NX - NR)
+    row = 0
     for k in range(len(drive)):
+        if every == 0:
+            row = k
+        elif k % every == 0:
+            for j in range(seen.shape[1]):
+                if seen[k, j] == seen[k, j]:
+                    X[j] = seen[k, j]
         now = start + k * dt
         t = now
         command = clamp(drive[k] / drive_limit, -1.0, 1.0)
@@ -168,9 +177,9 @@ def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure
                         reading_a = pressure_a; reading_b = pressure_b
                         if any_pressure_sensor:
                             {pressure_sensor7}
-                        Y[k, 0] = reading; Y[k, 1] = velocity; Y[k, 2] = reading_a; Y[k, 3] = reading_b
-                        Y[k, 4] = pressure_supply; Y[k, 5] = spool; Y[k, 6] = position
-                        Y[k, 7] = pressure_a; Y[k, 8] = pressure_b; Y[k, 9] = opening
+                        Y[row, 0] = reading; Y[row, 1] = velocity; Y[row, 2] = reading_a; Y[row, 3] = reading_b
+                        Y[row, 4] = pressure_supply; Y[row, 5] = spool; Y[row, 6] = position
+                        Y[row, 7] = pressure_a; Y[row, 8] = pressure_b; Y[row, 9] = opening
                     for i in range(NR):
                         slope[i] = K[i]
                     for i in range(NX - NR):
@@ -197,6 +206,12 @@ def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure
                 failure[0] = now; failure[1] = count
                 return k
     return len(drive)
+
+
+@njit(RUN, cache=True, nogil=True, error_model="numpy")
+def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
+    """As `integrate`, with nothing that was seen."""
+    return integrate(drive, dt, start, Y[:0], 0, max_step, max_turn, on, P, hydraulic, X, M, Y, failure)
 
 
 @njit("void(f8[::1], f8, f8, u1[::1], f8[::1], f8[::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
@@ -269,28 +284,29 @@ def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memorie
     return len(starts)
 
 
-@njit("i8(f8[::1], f8, f8, f8, f8[:, ::1], i8, i8[::1], i8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1],"
+@njit("i8(f8[::1], f8, f8, f8, f8[:, ::1], i8, i8[::1], i8, i8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1],"
       " f8[:, ::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
-def track(drive, dt, max_step, max_turn, seen, every, starts, run_up, on, P, hydraulic, X, M, states, memories,
+def track(drive, dt, max_step, max_turn, seen, every, starts, run_up, past, on, P, hydraulic, X, M, states, memories,
           failure):
     """Runs along ``drive``, set every so many samples to what is seen of the first states; keeps X and M at starts.
 
-    What lies more than ``run_up`` samples before a start, and after the one before, is left out."""
-    Y = np.empty((every, 10))
+    What lies more than ``run_up`` samples before a start, and after the one before, is left out; memories of the drive
+    are primed over ``past`` samples of that."""
+    Y = np.empty((1, 10))
     k = 0
     for i in range(len(starts)):
-        k += max(starts[i] - run_up - k, 0) // every * every
-        while True:
-            for j in range(seen.shape[1]):
-                if seen[k, j] == seen[k, j]:
-                    X[j] = seen[k, j]
-            if k == starts[i]:
-                break
-            ahead = drive[k:min(k + every, starts[i])]
-            done = run(ahead, dt, k * dt, max_step, max_turn, on, P, hydraulic, X, M, Y, failure)
-            if done < len(ahead):
-                return i
-            k += len(ahead)
+        first = k + max(starts[i] - run_up - k, 0) // every * every
+        if first > k:
+            before = max(first - past, k)
+            prime(drive[before:first], dt, before * dt, on, P, X, M)
+        k = starts[i]
+        done = integrate(drive[first:k], dt, first * dt, seen[first:k], every, max_step, max_turn, on, P, hydraulic, X,
+                         M, Y, failure)
+        if done < k - first:
+            return i
+        for j in range(seen.shape[1]):
+            if seen[k, j] == seen[k, j]:
+                X[j] = seen[k, j]
         for j in range(len(X)):
             states[i, j] = X[j]
         for j in range(len(M)):

@@ -29,8 +29,7 @@ _OF_FORCES = ("moving_mass", "drive_force", "bristle_length", "bristle_time")  #
 _READINGS = 4  # of the outputs, the first: what sensors read
 FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
 MOST_HALVINGS = 6
-CORRECTED_EVERY = 4  # samples after which a tracked plant is set to what was measured, …
-UNCORRECTED = 256  # … and one whose inner states follow from the drive alone
+CORRECTED_EVERY = 4  # samples after which a tracked plant is set to what was measured
 
 
 class Plant:
@@ -62,7 +61,6 @@ class Plant:
         self.longest_step = rates.step(rates.fastest(self._active, values, model.kind), longest_step, refinement)
         self._clear_step = rates.step(rates.fastest(self._but_stops, values, model.kind), longest_step, refinement)
         self._shortest_dt = rates.shortest_sampling(self._active, values)
-        self._corrected_every = CORRECTED_EVERY
 
     def _values(self) -> dict[str, float]:
         return dict(zip(self.layout.parameters, self._parameters.tolist(), strict=True))
@@ -364,7 +362,7 @@ class Plant:
         other._on = np.zeros_like(self._on)
         for e in inner:
             other._on[self.layout.effects[e.name]] = 1
-        other._hydraulic, other._corrected_every = np.uint8(0), UNCORRECTED
+        other._hydraulic = np.uint8(0)
         rate = rates.fastest(inner, self._values(), "mechanical")
         other.longest_step = max(self.longest_step, rates.step(rate, self._allowed_step, self.refinement))
         return other
@@ -396,9 +394,10 @@ class Plant:
         """States at each start, those that no sensor sees propagated along the record, the others as measured.
 
         ``drive`` (N,) [V]; ``starts`` (S,) rising sample indices; ``seen`` (N, 4): position, velocity, pressures of
-        A and B as measured, NaN where they were not; ``run_up``: samples before a start that do, by default all, at
-        least `LONGEST_MEMORY`. Returns the states (S, n_states) and memories (S, n_memory); those of the position's
-        sensor begin anew, as what was measured has passed it.
+        A and B as measured, NaN where they were not; ``run_up``: samples before a start that do, by default all;
+        before them effects on the command see `LONGEST_MEMORY` samples of the drive, or all where they never forget and
+        follow nothing else. Returns the states (S, n_states) and memories (S, n_memory); those of the position's sensor
+        begin anew, as what was measured has passed it.
 
         :raises SimulationError: a state stops being finite.
         """
@@ -413,10 +412,11 @@ class Plant:
         begin = self.initial_state(drive=float(u[0]), **self._balanced(measured[0]))
         x, memory, failure = begin.states.copy(), begin.memory.copy(), np.zeros(2)
         states, memories = np.empty((len(first), x.size)), np.empty((len(first), memory.size))
+        past = len(u) if self.lasting_memories and self.drive_path is not None else LONGEST_MEMORY
+        run_up = len(u) if run_up is None else run_up
         done = self._compiled.track(
-            u, dt, self.longest_step, self._turn, measured, self._corrected_every, first,
-            len(u) if run_up is None else max(run_up, LONGEST_MEMORY), self._on, self._parameters, self._hydraulic, x,
-            memory, states, memories, failure,
+            u, dt, self.longest_step, self._turn, measured, CORRECTED_EVERY, first, run_up, past, self._on,
+            self._parameters, self._hydraulic, x, memory, states, memories, failure,
         )  # fmt: skip
         if done < len(first):
             sample = min(max(int(failure[0] / dt + 1e-6), 0), len(u) - 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,11 @@ from hydraulic_sim.arrays import Array, Index
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
-from hydraulic_sim.plant import LONGEST_MEMORY, Plant
+from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.known_starts import KnownStarts
-from hydraulic_sysid.estimation.run_ups import RunUps, longest_worth, sufficient
+from hydraulic_sysid.estimation.run_ups import SHORTEST, RunUps, longest_worth, sufficient
 from hydraulic_sysid.estimation.segments import STICK_SPEED, Segments, cut
 from hydraulic_sysid.estimation.shooting import Shooting
 
@@ -235,19 +236,19 @@ def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(
 
 
 @pytest.mark.parametrize(
-    ("effect", "memory", "forgets"),
+    ("effect", "memory", "values"),
     [
-        ("spool_dynamics", "damping", True),
-        ("supply_droop", "time", True),
-        ("structural_flexibility", "mass", True),
-        ("valve_hysteresis", "half_width", False),
+        ("spool_dynamics", "damping", {}),
+        ("supply_droop", "time", {}),
+        ("structural_flexibility", "mass", {}),
+        ("valve_hysteresis", "half_width", {"half_width": 0.2}),
     ],
 )
 def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
-    model: Model, effect: str, memory: str, forgets: bool, monkeypatch: pytest.MonkeyPatch
+    model: Model, effect: str, memory: str, values: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two segments far apart, each long after a burst that leaves the valve's play on the other side."""
-    plant = Plant.for_fits(model.with_effect(effect, {} if forgets else {"half_width": 0.2}))
+    plant = Plant.for_fits(model.with_effect(effect, values))
     time = DT * np.arange(40_000)
     burst = np.where(time < 20.0, 8.0, -8.0) * np.sin(2.0 * np.pi * 2.0 * time)
     drive = np.where(time % 20.0 < 1.0, burst, np.sin(2.0 * np.pi * time))
@@ -264,19 +265,57 @@ def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
     shooting = Shooting(plant, [apart])
     states = shooting.initial_states
     short = shooting.simulated(plant, states)[0]
-    assert (run_ups[-1] is not None) == forgets
+    assert run_ups[-1] is not None
     tried = len(run_ups)
     for known in (apart, apart.subset(np.array([False, True]))):
         other = Shooting(plant, [known])
         other.simulated(plant, other.initial_states)
     # Another fit knows it, and one to some of the segments, unless a longer one is worth it for them, and might do.
-    assert len(run_ups) == tried + (2 if forgets else 4)
+    assert len(run_ups) == tried + 2
     slower = plant.with_parameters({f"{effect}.{memory}": 8.0 * plant.value(f"{effect}.{memory}")})
     Shooting(slower, [apart]).simulated(slower, states)
     assert len(run_ups) > tried + 3, "of another memory it is another"
     whole = Shooting(plant, [replace(apart, run_ups=Never())]).simulated(plant, states)[0]
     assert run_ups[-1] is None
     assert np.all(np.abs(short - whole) <= 1e-3 * np.ptp(whole, axis=(0, 1)))
+
+
+MOVED = '''"""A valve that keeps where the piston was furthest, as no run-up shows."""
+from hydraulic_sim.effect import Effect, Parameter
+
+def furthest(command, position, size, memory):
+    memory[0] = max(memory[0], position)
+    return command + size * memory[0]
+
+EFFECT = Effect(
+    slot="command", summary="furthest", kernel=furthest, memory=1, equation="-", source="test", excited_by="-",
+    confused_with=(), distinguished_by="-",
+    parameters=(Parameter("size", "1/m", 0.1, (0.0, 1.0), "-", "test", null=0.0),),
+)
+'''
+
+
+def test_what_keeps_the_motion_is_propagated_along_the_whole_record(
+    model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "furthest.py"
+    file.write_text(MOVED)
+    plant = Plant.for_fits(model.with_effect_file(file).with_effect("furthest"))
+    drive = 0.4 * np.sin(2.0 * np.pi * 0.1 * DT * np.arange(12_000))
+    run = plant.simulate(drive, DT)
+    segments = cut([Record.sampled("one", DT, {"drive": drive, **{c: run[c] for c in NOISE}})], "hydraulic", 0.5)[0]
+    apart = segments.subset(np.arange(len(segments)) % 10 == 0)
+    assert plant.lasting_memories and plant.drive_path is None and longest_worth(apart.first) > 0
+    asked, track = [], Plant.track
+
+    def tracked(self: Plant, *arguments: Any) -> tuple[Array, Array]:
+        asked.append(arguments[4])
+        return track(self, *arguments)
+
+    monkeypatch.setattr(Plant, "track", tracked)
+    shooting = Shooting(plant, [apart])
+    shooting.simulated(plant, shooting.initial_states)
+    assert asked and set(asked) == {None}
 
 
 class Never(RunUps):
@@ -287,33 +326,33 @@ class Never(RunUps):
 
 
 def test_a_run_up_is_of_plants_with_the_same_laws_and_values_like_these() -> None:
-    sought, short, long = [], 2 * LONGEST_MEMORY, 16 * LONGEST_MEMORY
+    sought, short, long = [], 2 * SHORTEST, 16 * SHORTEST
 
     def seek(least: int, most: int) -> int | None:
         sought.append((least, most))
-        return 4 * LONGEST_MEMORY if most == long and len(sought) < 3 else None
+        return 4 * SHORTEST if most == long and len(sought) < 3 else None
 
     known = RunUps()
     assert known.find(("a", 1.0, 0.0), short, seek) is None, "it is longer"
-    assert [known.find(("a", v, 0.0), long, seek) for v in (1.0, 3.0, 0.3)] == [4 * LONGEST_MEMORY] * 3
+    assert [known.find(("a", v, 0.0), long, seek) for v in (1.0, 3.0, 0.3)] == [4 * SHORTEST] * 3
     assert known.find(("a", 2.0, 0.0), short, seek) is None
-    assert sought == [(LONGEST_MEMORY, short), (2 * short, long)], "once each, and nothing that has failed"
+    assert sought == [(SHORTEST, short), (2 * short, long)], "once each, and nothing that has failed"
     for path in (("a", 5.0, 0.0), ("a", -1.0, 0.0), ("a", 1.0, 1e-9)):
         assert known.find(path, long, seek) is None
-    assert sought[2:] == [(4 * LONGEST_MEMORY, long)] * 3, "what is shorter did for none of these laws"
+    assert sought[2:] == [(4 * SHORTEST, long)] * 3, "what is shorter did for none of these laws"
     known.find(("b", 1.0, 0.0), long, seek)
-    assert sought[-1] == (LONGEST_MEMORY, long)
+    assert sought[-1] == (SHORTEST, long)
 
 
 @pytest.mark.parametrize(
     ("first", "worth"),
-    [((500, 1000, 1500), 0), ((600, 1200, 1800), 1), ((4000, 12_000), 8), ((0,), 0), ((40,), 0)],
+    [((500, 1000, 1500), 128), ((600, 1200, 1800), 256), ((4000, 12_000), 2048), ((0,), 0), ((40,), 0)],
 )
 def test_a_run_up_is_worth_it_where_it_leaves_out_half_of_the_record(first: tuple[int, ...], worth: int) -> None:
-    assert longest_worth(np.array(first)) == worth * LONGEST_MEMORY
+    assert longest_worth(np.array(first)) == worth
 
 
-@pytest.mark.parametrize(("length", "found"), [(2000, None), (6000, 2 * LONGEST_MEMORY)])
+@pytest.mark.parametrize(("length", "found"), [(2000, None), (6000, 512)])
 def test_a_short_record_is_propagated_as_a_whole(length: int, found: int | None) -> None:
     """Of a state that forgets in 60 samples, at so few instants that they show no range of it, nothing is said."""
 
@@ -321,4 +360,5 @@ def test_a_short_record_is_propagated_as_a_whole(length: int, found: int | None)
         since = starts if run_up is None else np.minimum(starts, run_up)
         return (np.sin(starts) + np.exp(-since / 60.0))[:, None]
 
-    assert sufficient(length, propagated, propagated, LONGEST_MEMORY, 8 * LONGEST_MEMORY) == found
+    assert sufficient(length, propagated, propagated, SHORTEST, 2048) == found
+

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hydraulic_sim.arrays import Array, Index, Mask
-from hydraulic_sim.plant import LONGEST_MEMORY
 
 Propagated = Callable[[Index, "int | None"], Array]
-"""Inner states and memories (S, …) at some samples (S,), after so many samples of run-up or from the beginning."""
+"""Inner states (S, n) at some samples (S,), after so many samples of run-up or from the beginning."""
 
+SHORTEST = 32  # samples of run-up that are tried
+_APART = 512  # samples between which inner states are compared
 _SAME = 1e-3  # of the range of a state: off by less after a run-up, it is as from the beginning
 _AMPLIFIED = 1e-4  # of that range: what a nudge changes by so much no propagation knows (a load that rattles in a gap)
 _ALIKE = 4.0  # times larger or smaller are the values of plants that remember about as long
@@ -23,36 +24,37 @@ _WORTH = 0.5  # of a record, beyond which run-ups to its segments save too littl
 def longest_worth(first: Index) -> int:
     """Samples of the longest run-up to segments at ``first`` (S,) that still saves much; 0: none does.
 
-    A double of `LONGEST_MEMORY`, or that.
+    `SHORTEST`, or that times a power of 2.
     """
     gaps, samples = np.diff(first, prepend=0), 0
-    while np.minimum(gaps, max(2 * samples, LONGEST_MEMORY)).sum() < _WORTH * first[-1]:
-        samples = max(2 * samples, LONGEST_MEMORY)
+    while np.minimum(gaps, max(2 * samples, SHORTEST)).sum() < _WORTH * first[-1]:
+        samples = max(2 * samples, SHORTEST)
     return samples
 
 
 def sufficient(length: int, propagated: Propagated, nudged: Propagated, least: int, most: int) -> int | None:
     """Samples of run-up after which a plant has forgotten what it began with; None where it has not after the ``most``.
 
-    Tried are the ``least`` (a power of 2 times `LONGEST_MEMORY`) and its doubles, at samples of the record, of
-    ``length``, that are twice as far apart: between those it would be propagated anyway. ``nudged`` is another plant
-    that differs by nothing that is known.
+    Tried are the ``least`` and its doubles, at samples of the record, of ``length``, that are at least twice as far
+    apart: between those it would be propagated anyway. ``nudged`` is another plant that differs by nothing that is
+    known.
     """
-    starts = np.arange(2 * LONGEST_MEMORY, length, 2 * LONGEST_MEMORY)
-    every, most_every = least // LONGEST_MEMORY, min(most // LONGEST_MEMORY, len(starts))
-    if every > most_every or len(starts) < _FEWEST:
+    starts = np.arange(_APART, length, _APART)
+    if least > most or len(starts) < _FEWEST:
         return None
     whole = propagated(starts, None)
     ranges = np.ptp(whole, axis=0)
     vague: Mask | None = None
-    while every <= most_every:
-        chosen, samples = slice(every - 1, None, every), every * LONGEST_MEMORY
+    samples = least
+    while samples <= min(most, len(starts) * _APART // 2):
+        every = max(2 * samples // _APART, 1)
+        chosen = slice(every - 1, None, every)
         off = np.any(np.abs(propagated(starts[chosen], samples) - whole[chosen]) > _SAME * ranges, axis=1)
         if off.any() and vague is None:
             vague = np.any(np.abs(nudged(starts, None) - whole) > _AMPLIFIED * ranges, axis=1)
         if vague is None or not np.any(off & ~vague[chosen]):
             return samples
-        every *= 2
+        samples *= 2
     return None
 
 
@@ -91,7 +93,7 @@ class RunUps:
         known = self._known.setdefault(names, [])
         found = next((one for one in list(known) if one.answers(values, most)), None)
         if found is None:
-            least = min((one.samples or 2 * one.most for one in known), default=LONGEST_MEMORY)
+            least = min((one.samples or 2 * one.most for one in known), default=SHORTEST)
             found = _Found(values, seek(least, most), most)
             known.append(found)
         return found.samples if found.samples is not None and found.samples <= most else None

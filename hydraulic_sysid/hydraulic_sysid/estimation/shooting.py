@@ -276,12 +276,12 @@ class Shooting:
         """Samples before each segment from which on such a plant is propagated; None: from the beginning."""
         segments = self.segments[i]
         most = longest_worth(segments.first)
-        if not most:
+        if not most or (plant.lasting_memories and plant.drive_path is None):  # what never forgets the motion
             return None
 
         def propagated(plant: Plant, starts: Index, run_up: int | None) -> Array:
-            states, memories = plant.track(segments.drive, segments.record.dt, starts, segments.smoothed, run_up)
-            return np.concatenate((states[:, columns], memories[:, plant.lasting_memories]), axis=1)
+            states, _ = plant.track(segments.drive, segments.record.dt, starts, segments.smoothed, run_up)
+            return states[:, columns]
 
         def seek(least: int, most: int) -> int | None:
             nudged = plant.with_parameters({"moving_mass": (1.0 + _NUDGE) * plant.value("moving_mass")})
