@@ -204,6 +204,35 @@ def at(total: float) -> Misfit:
     return Misfit(2.0 * total / 3.0, total / 3.0, 2000, 1000, typical=total / 3000)
 
 
+@pytest.mark.parametrize(("share", "named"), [(0.3, 2), (0.5, 1)])
+def test_a_further_effect_that_a_curve_beats_is_none(
+    model, share: float, named: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second one explains 29 % of what the first leaves; a fault of the recording is asked for as much as it is."""
+    first = model.with_effect("valve_deadband")
+    one, two = state(first, 20000.0, {}), state(first.with_effect("load_spring"), 15000.0, {})
+    found, asked = iter([two, None]), []
+    search = Search.__new__(Search)
+    search.say, search.split, search.given = Progress(lambda _: None), Split([], []), model
+    search.settings, search.faults, search.as_recorded = FitSettings(), [], None
+    stubs = {
+        "first_effect": lambda base: one,
+        "finish": lambda base, enough: next(found),
+        "fault_beside": lambda base, state, further, share: asked.append(share),
+        "explore": lambda state, most: state,
+        "reviewed": lambda base, final, added, competing: (final, added, competing),
+        **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
+    }
+    for name, stub in stubs.items():
+        monkeypatch.setattr(search, name, stub, raising=False)
+    place = "hydraulic_sysid.diagnosis.search.search"
+    monkeypatch.setattr(f"{place}.borrowed", lambda *_: False)
+    monkeypatch.setattr(f"{place}.nonparametric_curves", lambda *_: [SimpleNamespace(share=share)])
+    done = search.forward(state(model, 60000.0, {}))
+    assert done.added == ["valve_deadband", "load_spring"][:named]
+    assert asked[0] == pytest.approx(0.8 * share)
+
+
 @pytest.mark.parametrize(
     ("name", "left", "absorbs"),
     [

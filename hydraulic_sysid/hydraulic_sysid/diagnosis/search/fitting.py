@@ -165,8 +165,11 @@ class Fitting:
         return Parameters.of(model, model.movable_keys(), self.priors).prior_cost
 
     def judged(self, state: SearchState) -> SearchState:
-        """A state, judged by the noise that it shows itself."""
-        back = False
+        """A state, judged by the noise that it shows itself.
+
+        Where something is missing, delays may go to and fro: they are asked again while that lowers what is left.
+        """
+        back, left = False, np.inf
         for number in range(ROUNDS):
             self.say("noise of the records")
             at, before = state.linearisation, self.split
@@ -175,9 +178,10 @@ class Fitting:
             # What is far off says little of the noise, however often it is asked.
             far = state.misfit.variance >= FAR_OFF
             more = len(after) > len(before)  # segments that are back are judged once more
-            if number and not (back or more) and (far or not (quieter(before, after) or retimed(before, after))):
+            again = quieter(before, after) or (retimed(before, after) and state.misfit.variance < left)
+            if number and not (back or more) and (far or not again):
                 break
-            self.split, back = after, more
+            self.split, back, left = after, more, state.misfit.variance
             state = self.state(state.model, self._last if state.misfit.variance < FAR_OFF else self._first)
         return state
 

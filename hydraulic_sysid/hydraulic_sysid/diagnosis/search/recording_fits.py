@@ -104,10 +104,14 @@ class RecordingFits(DataSheetFits):
         self.split = found.split
         self._assumed += 1
 
-    def fault_beside(self, base: SearchState, state: SearchState, further: SearchState | None) -> SearchState | None:
+    def fault_beside(
+        self, base: SearchState, state: SearchState, further: SearchState | None, share: float
+    ) -> SearchState | None:
         """A ``state`` with effects on records with a fault that explains more than a ``further`` effect, if any does.
 
         What hides a small delay of the pressures may itself be much larger.
+
+        :param share: of what is left, that it must explain
         """
         if self._assumed == MOST_FAULTS or (further is None and state.misfit.variance - 1.0 < NOTHING_LEFT):
             return None
@@ -115,7 +119,7 @@ class RecordingFits(DataSheetFits):
         best = state.misfit.fit if further is None else further.misfit.fit
         readings = [f for f in recording_faults(state.linearisation, disturbances=False) if not f.linear]
         found = self.fault(state, readings, state.misfit.fit - best)
-        if found is None:
+        if found is None or explained(state.misfit, found.misfit) < share:
             return None
         sound = not found.fault.unusual(self.split.interval)
         if further is not None and _plainer(further, state, found, sound):

@@ -29,6 +29,7 @@ from .fitting import FAR_OFF, Task, quieter, retimed, spiked
 from .force_balance import drives_by_force, force_shares
 from .force_curves import Forces
 from .misfit import SMALL, Misfit, explained, material
+from .nonparametric_curves import nonparametric_curves
 from .progress import OutOfTimeError
 from .recording_fits import RIVAL, RecordingFits
 from .score_test import CandidateScore, score
@@ -36,6 +37,7 @@ from .search_state import SearchResult, SearchState
 from .set_aside import accidents
 from .spectral_lines import record_features
 from .worth import (
+    AS_GOOD,
     FURTHER,
     MOSTLY,
     NOTHING_LEFT,
@@ -196,6 +198,10 @@ class Search(RecordingFits):
                     path, better = [base], None
             if better is not None and borrowed(path[-1], better, new_effect(better, path[-1])):
                 better = None
+            needed = 0.0
+            if better is not None and added:
+                needed = AS_GOOD * self.shown(path[-1], better)
+                better = better if explained(path[-1].misfit, better.misfit) >= needed else None
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
             doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= NOTHING_LEFT)
             loose = self.loose(path[-1]) if doubtful else None
@@ -204,7 +210,7 @@ class Search(RecordingFits):
                 for name in added:
                     model = model.without_effect(name)
                 return self.onward(base, model, loose)
-            mended = self.fault_beside(base, path[-1], better) if added else None
+            mended = self.fault_beside(base, path[-1], better, needed) if added else None
             if mended is not None:
                 return self.onward(base, base.model, mended)
             if better is None:
@@ -229,6 +235,16 @@ class Search(RecordingFits):
                 misfits = self._misfits(base, final, kept, competing)
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
+
+    def shown(self, before: SearchState, after: SearchState) -> float:
+        """What share of what is left a curve without a law behind it explains, where that may be more than an effect.
+
+        Then what is left is the shape of a law, of one that was found or of one that the library lacks, and one effect
+        after the other would only imitate it. What is missing explains more, fitted, than a curve does to first order.
+        """
+        if explained(before.misfit, after.misfit) >= AS_GOOD:
+            return 0.0
+        return max((c.share for c in nonparametric_curves(before.linearisation, self.say)), default=0.0)
 
     def add(self, name: str) -> SearchResult:
         """One effect on top of the model, whatever it explains.
