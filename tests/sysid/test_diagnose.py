@@ -22,6 +22,7 @@ from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, HeldNumbers, as_filed, relaxed
 from hydraulic_sysid.diagnosis.search.drift import Drift
 from hydraulic_sysid.diagnosis.search.drive_faults import BETWEEN_SAMPLES
+from hydraulic_sysid.diagnosis.search.fitting import Fitting
 from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material, reduction
@@ -202,6 +203,36 @@ def as_recorded(model, total: float, noise: float | None = None) -> SearchState:
 
 def at(total: float) -> Misfit:
     return Misfit(2.0 * total / 3.0, total / 3.0, 2000, 1000, typical=total / 3000)
+
+
+class SameSplit(list):
+    """A split that is judged by nothing new."""
+
+    def judged(self, *_: Any) -> SameSplit:
+        return self
+
+
+@pytest.mark.parametrize(
+    ("left", "fits"), [([2.05, 1.99, 1.92, 1.99, 1.9], 3), ([1.5, 1.4, 1.3, 1.2, 1.1, 1.0, 0.9], 6)]
+)
+def test_delays_are_asked_again_while_that_lowers_what_is_left(
+    left: list[float], fits: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where an effect is missing they go to and fro, and what is left with them."""
+    point = SimpleNamespace(point=None, columns=[])
+    begin, *states = [
+        SimpleNamespace(misfit=SimpleNamespace(variance=v), linearisation=point, model=None) for v in left
+    ]
+    fitting, done = Fitting.__new__(Fitting), list[Any]()
+    fitting.say, fitting.split = Progress(lambda _: None), SameSplit()
+    stubs = {"_first": FitSettings(), "_last": FitSettings(), "_laws": lambda *_: []}
+    for name, stub in {**stubs, "state": lambda *_: done.append(states[len(done)]) or done[-1]}.items():
+        monkeypatch.setattr(fitting, name, stub, raising=False)
+    place = "hydraulic_sysid.diagnosis.search.fitting"
+    for name, answer in (("refined", []), ("ordinary", []), ("quieter", False), ("retimed", True)):
+        monkeypatch.setattr(f"{place}.{name}", lambda *_, answer=answer: answer)
+    fitting.judged(begin)
+    assert len(done) == fits
 
 
 @pytest.mark.parametrize(("share", "named"), [(0.3, 2), (0.5, 1)])
