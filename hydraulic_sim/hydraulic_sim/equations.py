@@ -128,12 +128,13 @@ def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydrauli
     slope = np.empty(NR); rates = np.empty(NX - NR); goals = np.empty(NX - NR)
     row = 0
     for k in range(len(drive)):
-        if every == 0:
+        if every != 0:
+            if k % every == 0:
+                for j in range(seen.shape[1]):
+                    if seen[k, j] == seen[k, j]:
+                        X[j] = seen[k, j]
+        else:
             row = k
-        elif k % every == 0:
-            for j in range(seen.shape[1]):
-                if seen[k, j] == seen[k, j]:
-                    X[j] = seen[k, j]
         now = start + k * dt
         t = now
         command = clamp(drive[k] / drive_limit, -1.0, 1.0)

@@ -69,13 +69,13 @@ def plant_source(model: Model, rate: float) -> PlantSource:
     active = [e for e in layout.library.values() if e.name in model.effects or e.always_on]
     names = {e.name for e in active}
     known = {f"on[{i}]": float(name in names) for name, i in layout.effects.items()}
-    known["hydraulic"] = float(model.kind == "hydraulic")
+    known |= {"hydraulic": float(model.kind == "hydraulic"), "seen": 0.0, "every": 0.0}  # nothing is seen of it
     scope, parts = _functions(active)
     scope |= {"NX": len(layout.states), "NR": layout.n_rates}
     module = compose.write_module(layout.library)
-    for name, text in (("relax", module), ("run", module), ("see", _see(layout))):
+    for name, python, text in (("relax", "relax", module), ("run", "integrate", module), ("see", "see", _see(layout))):
         result = "long" if name == "run" else "double"
-        tree = tree_of(text, name)
+        tree = tree_of(text, python)
         # The memories are an array also where no effect has any.
         arrays = arrays_of(tree, scope) | {a.arg for a in tree.args.args if a.arg == "M"}
         returns = 0 if name == "see" else 1

@@ -170,7 +170,7 @@ class FitPoint:
         Initial states begin where they will fit best, to first order, or where they only follow the parameters: in
         segments far from linear the former may lead nowhere. The directions in which they act are kept.
         """
-        shooting, steps = self.shooting, [c @ change for c in self.columns]
+        shooting, steps = self.shooting, list(results(lambda c: c @ change, self.columns))
         parameters = self.parameters.moved(change)
         plant = shooting.plant.with_parameters(parameters.by_key)
         starts = [
@@ -191,11 +191,13 @@ class FitPoint:
         """The derivatives, so changed that they give what a step has shown, and little where it did not lead."""
         weighted = change * np.diag(self.normal.information)
         share = weighted / max(float(weighted @ change), 1e-300)
-        found = []
-        for columns, own, p, new in zip(self.columns, self._beyond, self.projections, there, strict=True):
+
+        def changed(each: tuple[Array, Array, Projection, Projection]) -> Array:
+            columns, own, p, new = each
             shown = p.beyond((new.raw - p.raw)[..., None])[..., 0]
-            found.append(columns + (shown - own @ change)[..., None] * share)
-        return found
+            return columns + (shown - own @ change)[..., None] * share
+
+        return list(results(changed, zip(self.columns, self._beyond, self.projections, there, strict=True)))
 
     @property
     def exact(self) -> bool:

@@ -184,12 +184,14 @@ class Shooting:
         steps = np.where(values + steps <= parameters.high, steps, -steps)
         moved = zip(parameters.keys, (values + steps).tolist(), strict=True)
         plants = [plant.with_parameters({key: value}) for key, value in moved]
-        jobs = [(p, i) for p in plants for i in range(len(self.segments))]
-        found = self._map(lambda job: self._residual(job[0], job[1], initial_states[job[1]]), jobs)
         columns = [np.empty((*r.shape, len(parameters))) for r in base]
-        for number, residual in enumerate(found):
-            k, i = divmod(number, len(self.segments))
+
+        def column(job: tuple[int, int]) -> None:
+            k, i = job
+            residual = self._residual(plants[k], i, initial_states[i])
             columns[i][..., k] = (residual - base[i]) * (scales[k] / steps[k])
+
+        self._map(column, [(k, i) for k in range(len(plants)) for i in range(len(self.segments))])
         return columns
 
     def _map(self, function: Callable[..., T], items: Iterable) -> list[T]:
@@ -324,9 +326,11 @@ def better_of(
 
     That may take up most of what a move leaves.
     """
-    states, left = list[Array](), list[Projection]()
-    for old, p, new, q in zip(*one, *other, strict=True):
+
+    def chosen(each: tuple[Array, Projection, Array, Projection]) -> tuple[Array, Projection]:
+        old, p, new, q = each
         closer = (q.costs <= p.costs)[:, None]
-        states.append(np.where(closer, new, old))
-        left.append(p.with_raw(np.where(closer, q.raw, p.raw)))
-    return states, left
+        return np.where(closer, new, old), p.with_raw(np.where(closer, q.raw, p.raw))
+
+    found = list(results(chosen, zip(*one, *other, strict=True)))
+    return [states for states, _ in found], [left for _, left in found]

@@ -124,7 +124,7 @@ def diagnose(
         whole["settings"] = {**whole["settings"], "quick": quick}
         done = as_filed(finished(found, known), model)
         competing = {
-            name: as_filed(search.with_exact_laws(other, found.split), model)
+            name: as_filed(search.with_exact_laws(other, found.split, competing=True), model)
             for name, other in verdicts.alternatives(found, verdict).items()
         }
         tied = [name for name in verdict.added if verdict.indistinguishable_from(name)]

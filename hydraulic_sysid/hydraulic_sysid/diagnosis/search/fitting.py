@@ -138,15 +138,16 @@ class Fitting:
             progress=lambda *_: self.say.left(), priors=self.priors, starts=self.starts(smooth),
         )  # fmt: skip
 
-    def with_exact_laws(self, model: Model, split: Split) -> Model:
+    def with_exact_laws(self, model: Model, split: Split, competing: bool = False) -> Model:
         """A fitted model with the values that fit best where all laws are as they stand.
 
         A search lets them be off a little, each in each segment on its own, so that their details turn no verdict. What
-        the model is used for afterwards has one value for all.
+        the model is used for afterwards has one value for all. One that is ``competing`` may have numbers of the data
+        sheet free that say the same, along which a fit goes on for ever: it goes no further than those before.
         """
-        smooth = self._smooth(model)
+        smooth, settings = self._smooth(model), self._last if competing else self.settings
         try:
-            done = self.fitted_to([s.with_exact_laws() for s in split.to_fit], smooth, self.settings)
+            done = self.fitted_to([s.with_exact_laws() for s in split.to_fit], smooth, settings)
         except SimulationError:  # it does not run from where the records show the initial states
             return model
         return with_fitted_values(model, smooth.with_values(done.values))

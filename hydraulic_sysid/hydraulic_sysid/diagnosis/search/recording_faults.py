@@ -19,6 +19,7 @@ from hydraulic_sim.arrays import Array
 from hydraulic_sysid.data.display import percent
 from hydraulic_sysid.data.records.channels import CHAMBERS
 from hydraulic_sysid.estimation.levenberg_marquardt import bounded_step
+from hydraulic_sysid.estimation.parallel import results
 from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.segments import Segments
 
@@ -168,14 +169,10 @@ def recording_faults(at: Linearisation, disturbances: bool = True) -> list[Recor
     point = part.point
     runs = point.shooting.simulated(point.plant, point.initial_states)
     before = _cost(part, [p.raw for p in point.projections])
-    found = []
     # Of one pressure in each record, A or B, both together may be late just as well.
     channels = {c for s in point.shooting.segments for c in s.channels}
-    for hypothesis in HYPOTHESES:
-        if not hypothesis.shown_by(channels):
-            continue
-        fault = _best(part, runs, hypothesis, before, share)
-        found += [fault] if fault is not None else []
+    shown = [h for h in HYPOTHESES if h.shown_by(channels)]
+    found = [f for f in results(lambda h: _best(part, runs, h, before, share), shown) if f is not None]
     if disturbances and not any(s.disturbance.shape[-1] for s in point.shooting.segments):
         for one in DRIVE_HYPOTHESES:
             size = float(np.median([one.size(s) for s in at.split.segments]))
