@@ -342,6 +342,9 @@ def test_a_run_up_is_of_plants_with_the_same_laws_and_values_like_these() -> Non
     assert sought[2:] == [(4 * SHORTEST, long)] * 3, "what is shorter did for none of these laws"
     known.find(("b", 1.0, 0.0), long, seek)
     assert sought[-1] == (SHORTEST, long)
+    number = len(sought)
+    known.find(("b", 1.0), long, seek)
+    assert len(sought) == number + 1, "a law of that name with other values was written anew"
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,8 @@ class _Found:
 
     def answers(self, values: Array, most: int) -> bool:
         """Whether it holds for these values, too, and says enough of run-ups up to the ``most``."""
+        if values.shape != self.values.shape:  # an effect file of that name may have been written anew
+            return False
         if self.samples is None and self.most < most:
             return False
         larger, smaller = (f(np.abs(self.values), np.abs(values)) for f in (np.maximum, np.minimum))
