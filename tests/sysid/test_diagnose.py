@@ -257,8 +257,10 @@ def test_a_further_effect_that_a_curve_beats_is_none(
     for name, stub in stubs.items():
         monkeypatch.setattr(search, name, stub, raising=False)
     place = "hydraulic_sysid.diagnosis.search.search"
+    # A curve over the time is the shape of no law.
+    curves = [SimpleNamespace(share=0.9, variable="time"), SimpleNamespace(share=share, variable="opening")]
     monkeypatch.setattr(f"{place}.borrowed", lambda *_: False)
-    monkeypatch.setattr(f"{place}.nonparametric_curves", lambda *_: [SimpleNamespace(share=share)])
+    monkeypatch.setattr(f"{place}.nonparametric_curves", lambda *_: curves)
     done = search.forward(state(model, 60000.0, {}))
     assert done.added == ["valve_deadband", "load_spring"][:named]
     assert asked[0] == pytest.approx(0.8 * share)

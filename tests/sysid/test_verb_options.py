@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hydraulic_sysid.verbs import _options, bandwidth, calibrate, compare, diagnose
+from hydraulic_sysid.verbs import bandwidth, calibrate, compare, diagnose
 
 SAMPLE = Path(__file__).resolve().parents[2] / "examples" / "sample_bench"
 
@@ -49,10 +49,11 @@ def test_what_the_page_suggests_reads_the_same(tmp_path: Path) -> None:
         assert shlex.split(call)[: len(wanted)] == wanted, verb
 
 
-def test_records_segments_and_what_is_kept_back_are_read_again() -> None:
-    parser = _options.parser("diagnose", "a verb")
-    _options.add_diagnosis_options(parser)
-    named = ["--model", "m.yaml", "--record", "a.csv", "b.csv", "--segment", "0.12", "--holdout", "c.csv"]
-    given = {"record": ["a.csv", "b.csv"], "segment": 0.12, "holdout": ["c.csv"]}
-    assert _options.reading(parser.parse_args(named)) == {"reading": given}
-    assert _options.reading(_options.parser("design", "a verb").parse_args([])) == {}
+def test_a_segment_that_was_asked_for_is_asked_for_again(tmp_path: Path) -> None:
+    records = [str(SAMPLE / name) for name in ("steps.csv.gz", "triangle.csv.gz")]
+    arguments = ["--model", "sample_bench", "--record", *records, "--segment", "0.4"]
+    assert calibrate.main(["--check", *arguments, "--out", str(tmp_path)]) == 0
+    page = html.unescape((tmp_path / "report.html").read_text())
+    (call,) = re.findall(r"hydraulic_sysid calibrate (.*?)</code>", page)
+    said = shlex.split(call)
+    assert said[said.index("--record") + 1 :][:2] == records and said[said.index("--segment") + 1] == "0.4"

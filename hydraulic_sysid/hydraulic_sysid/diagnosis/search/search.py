@@ -39,6 +39,7 @@ from .spectral_lines import record_features
 from .worth import (
     AS_GOOD,
     FURTHER,
+    MORE_THAN_NOISE,
     MOSTLY,
     NOTHING_LEFT,
     PROMISES,
@@ -239,12 +240,14 @@ class Search(RecordingFits):
     def shown(self, before: SearchState, after: SearchState) -> float:
         """What share of what is left a curve without a law behind it explains, where that may be more than an effect.
 
-        Then what is left is the shape of a law, of one that was found or of one that the library lacks, and one effect
-        after the other would only imitate it. What is missing explains more, fitted, than a curve does to first order.
+        It is asked where more is left than the noise. Then what is left is the shape of a law, of one that was found or
+        of one that the library lacks, and one effect after the other would only imitate it. What is missing explains
+        more, fitted, than a curve does to first order. A curve over the time is the shape of none.
         """
-        if explained(before.misfit, after.misfit) >= AS_GOOD:
+        if before.misfit.variance < MORE_THAN_NOISE or explained(before.misfit, after.misfit) >= AS_GOOD:
             return 0.0
-        return max((c.share for c in nonparametric_curves(before.linearisation, self.say)), default=0.0)
+        curves = nonparametric_curves(before.linearisation, self.say)
+        return max((c.share for c in curves if c.variable != "time"), default=0.0)
 
     def add(self, name: str) -> SearchResult:
         """One effect on top of the model, whatever it explains.

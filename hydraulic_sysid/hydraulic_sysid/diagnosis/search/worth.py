@@ -30,7 +30,8 @@ EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to a
 MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
 ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
 OWN = 0.5  # of what an effect takes off, that must come back where it vanishes
-AS_GOOD = 0.8  # of what the best curve explains to first order, which a further effect must explain fitted to its end
+AS_GOOD = 0.8  # of what the best curve explains to first order, which a further effect must explain, fitted, where …
+MORE_THAN_NOISE = 2.0  # … this mean square over noise is left: as much as the noise again
 HOPELESS = 0.6  # of what noise does not explain: where less is explained, exchanging effects will not do either
 
 Enough = Callable[[str, Misfit, float], bool]
