@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import json
 import re
 from pathlib import Path
@@ -86,6 +87,12 @@ def test_curves_are_those_of_the_document(comparison: dict[str, Any]) -> None:
     stored = comparison["records"][0]["traces"]["position"]["measured"]
     assert np.allclose(trace_values(measured["y"]), 1e3 * np.array(stored["value"]), rtol=1e-6)
     assert np.allclose(trace_values(measured["x"]), stored["time"], rtol=1e-6)
+
+
+def test_what_is_suggested_reads_the_same(comparison: dict[str, Any]) -> None:
+    reading = {"record": ["a.csv", "b.csv"], "segment": 0.12, "holdout": ["c d.csv"]}
+    page = html.unescape(render([{**comparison, "reading": reading}]))
+    assert "diagnose --model sample_bench --record a.csv b.csv --segment 0.12 --holdout 'c d.csv' --out" in page
 
 
 def test_figures_carry_units_and_share_time(comparison: dict[str, Any]) -> None:

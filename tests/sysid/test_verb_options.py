@@ -47,13 +47,3 @@ def test_what_the_page_suggests_reads_the_same(tmp_path: Path) -> None:
     for verb, call in calls:
         wanted = ["--model", "sample_bench", "--record", steps, "--columns", str(columns), "--window", "1.0", "3.0"]
         assert shlex.split(call)[: len(wanted)] == wanted, verb
-
-
-def test_a_segment_that_was_asked_for_is_asked_for_again(tmp_path: Path) -> None:
-    records = [str(SAMPLE / name) for name in ("steps.csv.gz", "triangle.csv.gz")]
-    arguments = ["--model", "sample_bench", "--record", *records, "--segment", "0.4"]
-    assert calibrate.main(["--check", *arguments, "--out", str(tmp_path)]) == 0
-    page = html.unescape((tmp_path / "report.html").read_text())
-    (call,) = re.findall(r"hydraulic_sysid calibrate (.*?)</code>", page)
-    said = shlex.split(call)
-    assert said[said.index("--record") + 1 :][:2] == records and said[said.index("--segment") + 1] == "0.4"
