@@ -142,7 +142,7 @@ PROPOSED = {
         "beside": ["stribeck_friction"],
     }
 }
-SHOWN = {"summary": "force of any shape", "unit": "N", "lag": 0.0157, "knots": [-0.1, 0.1], "value": [0.0, 5.0]}
+SHOWN = {"summary": "a force of any shape", "unit": "N", "lag": 0.0157, "knots": [-0.1, 0.1], "value": [0.0, 5.0]}
 PROPOSED_LAW = {"proposed_effect": PROPOSED["proposed_effect"] | SHOWN}
 
 
@@ -162,7 +162,7 @@ PROPOSED_LAW = {"proposed_effect": PROPOSED["proposed_effect"] | SHOWN}
         (
             "outside the library",
             OUTSIDE | PROPOSED_LAW,
-            "The law that is proposed; any shape over the position; 15.7\u00a0ms late; 98.0\u00a0%; To first order",
+            "The law that is proposed; plant: a force of any shape over the position; 15.7\u00a0ms late; To first order",
         ),
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
         ("indistinguishable", {"recording": GAIN}, "Look whether pressure_a reads 5 % too much: calibrate it."),
