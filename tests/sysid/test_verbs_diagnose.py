@@ -162,7 +162,7 @@ PROPOSED_LAW = {"proposed_effect": PROPOSED["proposed_effect"] | SHOWN}
         (
             "outside the library",
             OUTSIDE | PROPOSED_LAW,
-            "The law that is proposed; plant: a force of any shape over the position; 15.7\u00a0ms late; To first order",
+            "proposed; plant: a force of any shape over the position; 15.7\u00a0ms late; To first order",
         ),
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
         ("indistinguishable", {"recording": GAIN}, "Look whether pressure_a reads 5 % too much: calibrate it."),
