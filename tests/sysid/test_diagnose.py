@@ -205,6 +205,17 @@ def at(total: float) -> Misfit:
     return Misfit(2.0 * total / 3.0, total / 3.0, 2000, 1000, typical=total / 3000)
 
 
+@pytest.mark.parametrize(("variance", "promised"), [(3.9, 0.5), (4.1, 0.0)])
+def test_a_first_effect_need_not_show_in_a_quick_refit_where_the_model_is_far_off(
+    model, variance: float, promised: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a strong offset of the position the best of six refits explained 5 %, and a fit nearly all."""
+    search = Search.__new__(Search)
+    monkeypatch.setattr(search, "_first_effect", (None, None), raising=False)
+    monkeypatch.setattr(search, "finish", lambda base, enough, promised: promised, raising=False)
+    assert search.first_effect(state(model, variance * 3000, {})) == promised
+
+
 class SameSplit(list):
     """A split that is judged by nothing new."""
 

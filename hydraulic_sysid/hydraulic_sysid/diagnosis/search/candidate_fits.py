@@ -132,14 +132,16 @@ class CandidateFits(Fitting):
             done = refit_rounded(at, with_fitted_values(base.model.with_effect(name), done.model))
         return CandidateRefit(name, done, misfit(self.split, done.costs, self.prior_cost(done.model)))
 
-    def finish(self, base: SearchState, enough: Enough) -> SearchState | None:
+    def finish(self, base: SearchState, enough: Enough, promised: float = PROMISED) -> SearchState | None:
         """The best of the refits, fitted to the end; None where none is worth it.
 
         ``enough(name, misfit, part)``: whether an effect's misfit is a part of the way to being worth it.
+
+        :param promised: the part that a quick refit must show to be finished
         """
         # A quick refit keeps what the model was bent to where the effect acts: the sum alone is asked for.
         least = base.misfit.total - base.misfit.least
-        worth = [r for r in base.refits if r.misfit.total < least and enough(r.name, r.misfit.summed, PROMISED)]
+        worth = [r for r in base.refits if r.misfit.total < least and enough(r.name, r.misfit.summed, promised)]
         if not worth:
             return None
         top = base.misfit.total - worth[0].misfit.total

@@ -13,7 +13,7 @@ from .candidate_fits import FULL, LATER_REFITS, NEAR, PROMISED
 from .data_sheet import relaxed, restored
 from .data_sheet_fits import DataSheetFits, new_effect
 from .drive_faults import costs_with
-from .fitting import Task, worse
+from .fitting import FAR_OFF, Task, worse
 from .holdout import Split
 from .misfit import explained, material, misfit
 from .recording_faults import RecordingFault, recording_faults, resized
@@ -130,10 +130,12 @@ class RecordingFits(DataSheetFits):
     def first_effect(self, base: SearchState) -> SearchState | None:
         """A state with the effect that explains most of what it leaves, fitted to the end; None where none is worth it.
 
-        Where a fault was set against it, it is known.
+        Where a fault was set against it, it is known. A model that is far off is so bent that quick refits may show
+        next to nothing of what a fit explains: then they need not.
         """
         (known, effect), self._first_effect = self._first_effect, (None, None)
-        return effect if known is base else self.finish(base, partial(enough_at_first, base))
+        promised = 0.0 if base.misfit.variance >= FAR_OFF else PROMISED
+        return effect if known is base else self.finish(base, partial(enough_at_first, base), promised)
 
     def bends(self, fault: RecordingFault, base: SearchState) -> bool:
         """Whether a fault is why a model leaves nothing only with small delays of all channels, or at bounds."""
