@@ -114,6 +114,14 @@ def rhs(now, S, command, on, P, hydraulic, K, R, G, AUX):
     AUX[9] = direction; AUX[10] = pressure_tank
 
 
+@njit("void(f8[::1], f8[:, ::1], i8)", cache=True, nogil=True, error_model="numpy")
+def correct(X, seen, k):
+    """Sets the first states to what was seen of them at a sample."""
+    for j in range(seen.shape[1]):
+        if seen[k, j] == seen[k, j]:
+            X[j] = seen[k, j]
+
+
 @njit("i8(f8[::1], f8, f8, f8[:, ::1], i8, f8, f8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1], f8[::1])",
       cache=True, nogil=True, error_model="numpy")
 def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
@@ -130,9 +138,7 @@ def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydrauli
     for k in range(len(drive)):
         if every != 0:
             if k % every == 0:
-                for j in range(seen.shape[1]):
-                    if seen[k, j] == seen[k, j]:
-                        X[j] = seen[k, j]
+                correct(X, seen, k)
         else:
             row = k
         now = start + k * dt
@@ -305,9 +311,7 @@ def track(drive, dt, max_step, max_turn, seen, every, starts, run_up, past, on, 
                          M, Y, failure)
         if done < k - first:
             return i
-        for j in range(seen.shape[1]):
-            if seen[k, j] == seen[k, j]:
-                X[j] = seen[k, j]
+        correct(X, seen, k)
         for j in range(len(X)):
             states[i, j] = X[j]
         for j in range(len(M)):

@@ -265,16 +265,17 @@ def test_a_further_effect_that_a_curve_beats_is_none(
         "reviewed": lambda base, final, added, competing: (final, added, competing),
         **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
     }
-    for name, stub in stubs.items():
+    for name, stub in {**stubs, "_curves": None}.items():
         monkeypatch.setattr(search, name, stub, raising=False)
-    place = "hydraulic_sysid.diagnosis.search.search"
+    place, times = "hydraulic_sysid.diagnosis.search.search", list[str]()
     # A curve over the time is the shape of no law.
     curves = [SimpleNamespace(share=0.9, variable="time"), SimpleNamespace(share=share, variable="opening")]
     monkeypatch.setattr(f"{place}.borrowed", lambda *_: False)
-    monkeypatch.setattr(f"{place}.nonparametric_curves", lambda *_: curves)
+    monkeypatch.setattr(f"{place}.nonparametric_curves", lambda *_: times.append("taken") or curves)
     done = search.forward(state(model, 60000.0, {}))
     assert done.added == ["valve_deadband", "load_spring"][:named]
     assert asked[0] == pytest.approx(0.8 * share)
+    assert search.curves(one, lambda _: None) is curves and times == ["taken"], "those of a state are taken once"
 
 
 @pytest.mark.parametrize(

@@ -235,6 +235,18 @@ def test_fits_stay_away_from_parameters_that_make_the_physics_far_stiffer(
         shooting.try_out(stiff, shooting.initial_states)
 
 
+def run_ups_of(monkeypatch: pytest.MonkeyPatch) -> list[int | None]:
+    """Takes the run-up of every propagation along a record from here on."""
+    run_ups, track = list[int | None](), Plant.track
+
+    def tracked(self: Plant, *arguments: Any) -> tuple[Array, Array]:
+        run_ups.append(arguments[4])
+        return track(self, *arguments)
+
+    monkeypatch.setattr(Plant, "track", tracked)
+    return run_ups
+
+
 @pytest.mark.parametrize(
     ("effect", "memory", "values"),
     [
@@ -255,13 +267,7 @@ def test_what_no_sensor_sees_is_propagated_from_where_it_makes_no_difference(
     run = plant.simulate(drive, DT)
     apart = cut([Record.sampled("apart", DT, {"drive": drive, **{c: run[c] for c in NOISE}})], "hydraulic", 0.5)[0]
     apart = apart.subset(np.isin(np.arange(len(apart)), (24, 72)))
-    run_ups, track = [], Plant.track
-
-    def tracked(self: Plant, *arguments: Any) -> tuple[Array, Array]:
-        run_ups.append(arguments[4])
-        return track(self, *arguments)
-
-    monkeypatch.setattr(Plant, "track", tracked)
+    run_ups = run_ups_of(monkeypatch)
     shooting = Shooting(plant, [apart])
     states = shooting.initial_states
     short = shooting.simulated(plant, states)[0]
@@ -306,13 +312,7 @@ def test_what_keeps_the_motion_is_propagated_along_the_whole_record(
     segments = cut([Record.sampled("one", DT, {"drive": drive, **{c: run[c] for c in NOISE}})], "hydraulic", 0.5)[0]
     apart = segments.subset(np.arange(len(segments)) % 10 == 0)
     assert plant.lasting_memories and plant.drive_path is None and longest_worth(apart.first) > 0
-    asked, track = [], Plant.track
-
-    def tracked(self: Plant, *arguments: Any) -> tuple[Array, Array]:
-        asked.append(arguments[4])
-        return track(self, *arguments)
-
-    monkeypatch.setattr(Plant, "track", tracked)
+    asked = run_ups_of(monkeypatch)
     shooting = Shooting(plant, [apart])
     shooting.simulated(plant, shooting.initial_states)
     assert asked and set(asked) == {None}
@@ -364,4 +364,3 @@ def test_a_short_record_is_propagated_as_a_whole(length: int, found: int | None)
         return (np.sin(starts) + np.exp(-since / 60.0))[:, None]
 
     assert sufficient(length, propagated, propagated, SHORTEST, 2048) == found
-

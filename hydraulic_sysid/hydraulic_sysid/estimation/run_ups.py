@@ -68,8 +68,6 @@ class _Found:
 
     def answers(self, values: Array, most: int) -> bool:
         """Whether it holds for these values, too, and says enough of run-ups up to the ``most``."""
-        if values.shape != self.values.shape:  # an effect file of that name may have been written anew
-            return False
         if self.samples is None and self.most < most:
             return False
         larger, smaller = (f(np.abs(self.values), np.abs(values)) for f in (np.maximum, np.minimum))
@@ -78,9 +76,9 @@ class _Found:
 
 @dataclass
 class RunUps:
-    """The run-ups of one record that were found, by what a plant's memory hangs on."""
+    """The run-ups of one record that were found, by what a plant's memory hangs on: laws, and how many values each."""
 
-    _known: dict[tuple[str, ...], list[_Found]] = field(default_factory=dict)
+    _known: dict[tuple[str | None, ...], list[_Found]] = field(default_factory=dict)
 
     def find(
         self, hangs_on: tuple[float | str, ...], most: int, seek: Callable[[int, int], int | None]
@@ -90,9 +88,9 @@ class RunUps:
         None where it is more than the ``most``. ``seek`` is told the shortest that is worth trying, by what is known
         of such laws with other values, and the ``most``.
         """
-        names = tuple(part for part in hangs_on if isinstance(part, str))
+        laws = tuple(part if isinstance(part, str) else None for part in hangs_on)
         values = np.array([part for part in hangs_on if not isinstance(part, str)])
-        known = self._known.setdefault(names, [])
+        known = self._known.setdefault(laws, [])
         found = next((one for one in list(known) if one.answers(values, most)), None)
         if found is None:
             least = min((one.samples or 2 * one.most for one in known), default=SHORTEST)

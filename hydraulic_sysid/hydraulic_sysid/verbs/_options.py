@@ -93,7 +93,7 @@ def run(
 
                 page = write_page(folder, results.read_folder(folder))
         if options.json:
-            slim = _without(results.plain(done.result), bulky)
+            slim = _without(results.plain(result), bulky)
             print(json.dumps(slim, indent=2, ensure_ascii=False, allow_nan=False))
         else:
             show(done.result, tables.console())
@@ -168,12 +168,13 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
 
     What the page suggests next is to read the same. Nothing where a verb or its call names none.
     """
-    named = {name: getattr(options, name, None) for name in ("record", "columns", "window", "segment", "holdout")}
-    given = {name: value for name, value in named.items() if value is not None}
-    if not given.get("record"):
+    paths = {name: getattr(options, name, None) for name in ("record", "holdout")}
+    # Some verbs hold out a part of every record, and no files.
+    files = {name: [str(path) for path in given] for name, given in paths.items() if isinstance(given, list) and given}
+    others = {name: getattr(options, name, None) for name in ("columns", "window", "segment")}
+    if "record" not in files:
         return {}
-    text = {k: [str(one) for one in v] for k, v in given.items() if isinstance(v, list) and k != "window"}
-    return {"reading": {**given, **text}}
+    return {"reading": {**files, **{name: value for name, value in others.items() if value is not None}}}
 
 
 def read_kept_back(paths: list[Path] | None, options: argparse.Namespace) -> list[Record]:

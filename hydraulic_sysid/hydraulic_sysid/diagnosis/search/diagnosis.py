@@ -111,7 +111,7 @@ def diagnose(
         curves: list[NonparametricCurve] = []
         much = found.final.misfit.usual > verdicts.RIGHT and not (found.by_force or found.stopped)
         if outside or (found.added and much):
-            curves = nonparametric_curves(suspect.linearisation, say)
+            curves = search.curves(suspect, say)
             verdict = verdicts.reviewed(verdict, found, curves)
             outside = verdict.kind == verdicts.OUTSIDE
             curves = curves if outside else []

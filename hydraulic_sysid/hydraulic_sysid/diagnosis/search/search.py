@@ -8,7 +8,7 @@ it builds on stands in layers: `fitting`, `candidate_fits`, `data_sheet_fits`, `
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -28,8 +28,9 @@ from .errors import DiagnosisError
 from .fitting import FAR_OFF, Task, quieter, retimed, spiked
 from .force_balance import drives_by_force, force_shares
 from .force_curves import Forces
+from .linearisation import Linearisation
 from .misfit import SMALL, Misfit, explained, material
-from .nonparametric_curves import nonparametric_curves
+from .nonparametric_curves import NonparametricCurve, nonparametric_curves
 from .progress import OutOfTimeError
 from .recording_fits import RIVAL, RecordingFits
 from .score_test import CandidateScore, score
@@ -62,6 +63,7 @@ class Search(RecordingFits):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         self._judged_with: set[str] = set()
+        self._curves: tuple[Linearisation, list[NonparametricCurve]] | None = None
 
     def begin(self) -> SearchState:
         """The model, fitted and judged by the noise that it leaves; the data sheet is relaxed where that helps."""
@@ -201,7 +203,7 @@ class Search(RecordingFits):
                 better = None
             needed = 0.0
             if better is not None and added:
-                needed = AS_GOOD * self.shown(path[-1], better)
+                needed = AS_GOOD * self.share_of_a_curve(path[-1], better)
                 better = better if explained(path[-1].misfit, better.misfit) >= needed else None
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
             doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= NOTHING_LEFT)
@@ -237,7 +239,14 @@ class Search(RecordingFits):
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
 
-    def shown(self, before: SearchState, after: SearchState) -> float:
+    def curves(self, state: SearchState, say: Callable[[str], None]) -> list[NonparametricCurve]:
+        """The curves of what a state leaves, the one that explains most first; those asked for last are kept."""
+        at = state.linearisation
+        if self._curves is None or self._curves[0] is not at:
+            self._curves = at, nonparametric_curves(at, say)
+        return self._curves[1]
+
+    def share_of_a_curve(self, before: SearchState, after: SearchState) -> float:
         """What share of what is left a curve without a law behind it explains, where that may be more than an effect.
 
         It is asked where more is left than the noise. Then what is left is the shape of a law, of one that was found or
@@ -246,8 +255,7 @@ class Search(RecordingFits):
         """
         if before.misfit.variance < MORE_THAN_NOISE or explained(before.misfit, after.misfit) >= AS_GOOD:
             return 0.0
-        curves = nonparametric_curves(before.linearisation, self.say)
-        return max((c.share for c in curves if c.variable != "time"), default=0.0)
+        return max((c.share for c in self.curves(before, self.say) if c.variable != "time"), default=0.0)
 
     def add(self, name: str) -> SearchResult:
         """One effect on top of the model, whatever it explains.
