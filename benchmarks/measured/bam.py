@@ -104,7 +104,8 @@ def _row(where: Path, motor: Motor, work: Work) -> Row:
     words = ["--model", path, "--record", *(where / f"{log.name}.json" for log in fit), "--columns", motor.columns]
     if not work.quick:
         work.verb("compare", *words, into=f"{motor.name}_compared")
-    found = work.verb("diagnose", *words, "--segment", SEGMENT, "--within", 420, into=f"{motor.name}_diagnosed")
+    words += ["--segment", SEGMENT, "--within", 420, *(["--quick"] if work.quick else [])]
+    found = work.verb("diagnose", *words, into=f"{motor.name}_diagnosed")
     verdict, evidence = said(found)
     records = read_all([where / f"{log.name}.json" for log in fit], motor.columns)
     base = calibrate(load_model(path), records, settings=FitSettings(length=SEGMENT, robust=True)).model

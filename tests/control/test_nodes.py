@@ -179,13 +179,13 @@ def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(
     node("controller", "autostart:=true", "gains:=npid", *PATIENT)
     wait_until(lambda: answered() > 100, "a controller that answers")
     output = tmp_path / "response.json"
-    sine = ("kind:=sine", "amplitude:=0.03", "frequency:=1.0", "cycles:=7")
+    sine = ("kind:=sine", "amplitude:=0.03", "frequency:=1.0", "cycles:=5")
     player = node("reference", "autostart:=true", "exit_when_done:=true", f"output:={output}", *PLAYS, *sine)
     wait_until(lambda: controller_says(heard).get("reference_m") != "none", "a reference")
     refused = set_parameter(client, "output", str(tmp_path / "thesis.txt"), "/actuator/reference")
     assert not refused.successful and "output" in refused.reason
     begun = answered()
-    wait_until(lambda: answered() > begun + 2500, "some of the sine")
+    wait_until(lambda: answered() > begun + 2000, "some of the sine")
     assert set_parameter(client, "extra_effects", effects, "/actuator/plant").successful
     switched_ns = plant_now(heard)
     wait_until(lambda: effects[1:9] in health["effects"], "the effect")
@@ -193,9 +193,9 @@ def test_a_hidden_effect_in_mid_run_is_survived_and_shows_in_the_error(
     document = json.loads(output.read_text())
     response, switch = Response.from_document(document), 1e-9 * (switched_ns - document["start_ns"])
     error = np.abs(response.reference - response.position)
-    assert 1.0 < switch < 6.0, "in the middle of the sine"
+    assert 1.0 < switch < 4.5, "in the middle of the sine"
     before = error[(response.time > 0.5) & (response.time < switch - 0.6)]
-    after = error[(response.time > switch) & (response.time < 8.5)]
+    after = error[(response.time > switch) & (response.time < 6.5)]
     assert np.sqrt(np.mean(before**2)) < np.sqrt(np.mean(after**2)), "it shows in the error"
     assert after.max() < 0.02, "and does not run away"
     assert np.all(np.isfinite(response.drive)) and np.abs(response.drive).max() <= 10.0
@@ -212,7 +212,7 @@ def test_the_relay_experiment_through_the_topics(
     oscillation that follows depends on it, so there is no other run to compare with.
     """
     states, commands = client.collect("state"), client.collect("command")
-    plant("enable_on_activate:=false")
+    plant("enable_on_activate:=false", "real_time_factor:=0.25")  # of a faster one a process held up misses states
     output, settings = tmp_path / "relay.json", RelaySettings()
     process = node("relay", f"output:={output}", "use_sim_time:=true", "state_timeout:=5.0")
     wait_until(lambda: states and commands, "states and commands: from here on all are heard")

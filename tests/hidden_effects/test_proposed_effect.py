@@ -20,7 +20,7 @@ from hydraulic_sysid.verbs.add import main as add
 from hydraulic_sysid.verbs.diagnose import main as diagnose
 
 BENCH = benches.Bench("unknown", ("worn_barrel_leakage",), "strong", 1)
-SECONDS = 8
+SECONDS = 5
 LIBRARY = ("end_stop", "viscous_friction", "coulomb_friction", "internal_leakage", "constant_load")
 PLACES = ("unknown_conductance", "unknown_force")
 

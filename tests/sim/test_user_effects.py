@@ -159,6 +159,7 @@ def test_a_new_process_finds_what_was_compiled(workshop: Workshop) -> None:
     assert workshop.compiled() == known
 
 
+@pytest.mark.thorough
 def test_a_changed_constant_reaches_two_processes_compiling_at_once(workshop: Workshop) -> None:
     known = workshop.compiled()
     workshop.edit("GAIN = 2.0", "GAIN = 3.0")

@@ -82,6 +82,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
     return load_model(path)
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_a_force_that_answers_late_is_proposed_with_its_lag(model: Model, records: list[Record], tmp_path: Path):
     search = Search.of(model, records, (), SETTINGS, lambda _: None)

@@ -88,7 +88,7 @@ THOROUGH = ("stribeck_friction", "command_delay", "sensor_lag")  # another one o
 def test_subsystem_of_a_missing_effect_is_found(model: Model, effect: str) -> None:
     subsystem, values = FAULTS[effect]
     plant = model.with_effect(effect, values)
-    result = locate(model, [record_of(plant, 2), record_of(plant, 3)], maps=False)
+    result = locate(model, [record_of(plant, seed, seconds=5.0) for seed in (2, 3)], maps=False)
     assert result["verdict"]["level"] != "explained"
     assert first(result)["name"] == subsystem, [(s["name"], s["alone"]) for s in result["attribution"]]
     assert first(result)["share"] > 0.5

@@ -212,6 +212,7 @@ def test_a_node_that_dies_fails_its_step_and_ends_the_run(demo: Any, wait_until:
     assert not (run.out / "report.html").exists()
 
 
+@pytest.mark.thorough
 def test_an_abort_is_answered_by_another_run_and_ctrl_c_by_an_end(demo: Any, wait_until: Any) -> None:
     run = demo()  # in lockstep, so that a busy machine aborts nothing; the long experiments leave time to do so
     excited(run, wait_until)

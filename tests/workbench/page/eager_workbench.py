@@ -1,6 +1,6 @@
 """The workbench for a test that waits for a whole search: all its processes run as long as the slowest of them.
 
-The jobs do not give way to others, and the simulator has a quarter of the usual rate.
+The jobs do not give way to others, and the simulator has an eighth of the usual rate.
 """
 
 from __future__ import annotations
@@ -12,5 +12,5 @@ from hydraulic_workbench.nodes import workbench
 
 if __name__ == "__main__":
     jobs.NICE = 0
-    plant_kinds.SENSORS["rate"] = 250.0
+    plant_kinds.SENSORS["rate"] = 125.0
     sys.exit(workbench.main())
