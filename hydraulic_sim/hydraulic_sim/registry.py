@@ -97,6 +97,21 @@ class Library(Mapping[str, Effect]):
         """A hash over the text that every effect was read from, so that compiled physics is never stale."""
         return _digest("".join(f"{name} {self._files[name].digest}\n" for name in self).encode())
 
+    def with_alone(self, names: Iterable[str]) -> Library:
+        """Of these effects, of those that are always on, and of those whose parameters any of them uses.
+
+        Fewer compile faster.
+
+        :raises EffectError: an unknown name.
+        """
+        wanted, queue = set[str](), [*names, *(name for name in self if self[name].always_on)]
+        while queue:
+            name = queue.pop()
+            if name not in wanted:
+                wanted.add(name)
+                queue += [owner for key in self[name].uses.values() if (owner := key.rpartition(".")[0])]
+        return Library(self._files[name] for name in self._files if name in wanted)
+
     def with_files(self, files: Iterable[str | Path]) -> Library:
         """This library and the effects of the given files.
 

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hydraulic_sim import registry
 from hydraulic_sim.effect import Effect, Parameter, State
 from hydraulic_sim.errors import EffectError, ModelError
 from hydraulic_sim.model import Entry, Model
+from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sim.registry import library
 
@@ -234,3 +236,20 @@ def test_switching_effects_compiles_nothing(bare: Model, monkeypatch: pytest.Mon
     monkeypatch.setattr(compiled, "write_module", lambda found: pytest.fail("compiled again"))
     Plant(bare.with_effect("spool_dynamics").with_effect("backlash", {"gap": 2e-3}))
     assert registry.library() is registry.library()
+
+
+def test_a_lean_model_has_what_is_on_and_what_that_uses(effect_file: Write) -> None:
+    """It compiles faster, and runs as with the whole library."""
+    body = "def kernel(velocity, size, level):\n    return -size * level * velocity"
+    mine = effect_file(body, more="uses={'level': 'coulomb_friction.level'},")
+    model = replace(load_model("sample_bench"), effects=("viscous_friction",)).with_effect_file(mine)
+    lean = replace(model, lean=True)
+    assert set(lean.library) == {"end_stop", "viscous_friction", "coulomb_friction", "mine"}
+    assert set(lean.with_effect("mine").library) == set(lean.library), "it is there before it is on"
+    assert lean.keys() == model.keys() and lean.free_keys() == model.free_keys()
+    with pytest.raises(ModelError, match="backlash"):
+        lean.with_effect("backlash")
+    drive = np.tile([2.0, -1.0], 50)
+    bare = replace(load_model("sample_bench"), effects=("viscous_friction",))
+    whole, small = (Plant(m).simulate(drive, 1e-3) for m in (bare, replace(bare, lean=True)))
+    assert np.array_equal(small.position, whole.position) and np.array_equal(small.pressure_a, whole.pressure_a)

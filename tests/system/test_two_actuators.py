@@ -16,7 +16,7 @@ from hydraulic_sysid.data.records import read_records
 from hydraulic_sysid.excitation import Plan, save_plan
 from hydraulic_sysid.excitation.signals.chirp import Chirp
 
-MODEL, RATE = "sample_bench", 250.0
+MODEL, RATE = "sample_bench", 100.0
 ON_ONE_GRAPH = {"/diagnostics", "/parameter_events", "/rosout"}
 NODES = {
     ("plant", "/left"),

@@ -302,11 +302,12 @@ def holds(part: Linearisation, fit: _Fit, law: Candidate, file: Path, records: S
 def _with_law(
     part: Linearisation, candidate: Candidate, file: Path, records: Sequence[str], others: Sequence[Path] = ()
 ) -> Model:
-    """The model with a candidate's law on, written to a ``file``; the library has ``others`` as well."""
+    """The model with a candidate's law on, written to a ``file``; its library, a lean one, has ``others`` as well."""
     place = candidate.place
     file.parent.mkdir()
     file.write_text(effect_text(place, candidate.fitted, _extent(place.values), "On trial.", records))
-    return replace(part.model, user_effects=(*part.model.user_effects, *others, file)).with_effect(file.stem)
+    files = (*part.model.user_effects, *others, file)
+    return replace(part.model, user_effects=files, lean=True).with_effect(file.stem)
 
 
 def begun(part: Linearisation, model: Model, heights: Sequence[str], keys: Sequence[str], priors: Priors) -> Model:
