@@ -56,7 +56,7 @@ class Model:
     def library(self) -> Library:
         """The built-in effects and this model's own, as its files are when it is first asked for."""
         every = library(self.user_effects)
-        return every.with_alone([*self.effects, *(f.stem for f in self.user_effects)]) if self.lean else every
+        return every.only([*self.effects, *(f.stem for f in self.user_effects)]) if self.lean else every
 
     def parameter(self, key: str) -> Parameter:
         """The library's record of a parameter.

@@ -97,10 +97,8 @@ class Library(Mapping[str, Effect]):
         """A hash over the text that every effect was read from, so that compiled physics is never stale."""
         return _digest("".join(f"{name} {self._files[name].digest}\n" for name in self).encode())
 
-    def with_alone(self, names: Iterable[str]) -> Library:
-        """Of these effects, of those that are always on, and of those whose parameters any of them uses.
-
-        Fewer compile faster.
+    def only(self, names: Iterable[str]) -> Library:
+        """These effects, those that are always on, and those whose parameters any of them uses: fewer compile faster.
 
         :raises EffectError: an unknown name.
         """
@@ -110,7 +108,7 @@ class Library(Mapping[str, Effect]):
             if name not in wanted:
                 wanted.add(name)
                 queue += [owner for key in self[name].uses.values() if (owner := key.rpartition(".")[0])]
-        return Library(self._files[name] for name in self._files if name in wanted)
+        return Library(map(self.file, wanted))
 
     def with_files(self, files: Iterable[str | Path]) -> Library:
         """This library and the effects of the given files.
