@@ -341,7 +341,7 @@ class Client:
         """Lifecycle state of a managed node by its label."""
         return str(self.call("lifecycle_msgs/srv/GetState", f"{node}/get_state").current_state.label)
 
-    def source(self, name: str, drive: float, period: float = 0.005) -> Source:
+    def source(self, name: str, drive: float, period: float = 0.01) -> Source:
         """A source that commands `drive` [V] from now on, until it is stopped."""
         return Source(self, name, drive, period)
 

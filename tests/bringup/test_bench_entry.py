@@ -445,7 +445,7 @@ def test_what_protects_the_bench_is_not_among_them() -> None:
         "plant_node/test_lockstep.py",
         "plant_node/test_plant_loop.py",
         "system/test_vcan.py",
-        "workbench/page/test_live.py",  # redraws per second
+        "workbench/page/test_redraws.py",  # per second
         "workbench/page/test_without_plant.py",  # the first paint
         "workbench/test_workbench_node.py",  # milliseconds from the stop button to 0 V
     }

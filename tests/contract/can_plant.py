@@ -24,7 +24,7 @@ from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 
 CHANGES: dict[str, dict[str, Any]] = {
-    "": {"interface": "virtual", "channel": "contract", "rate": 200},  # devices and driver in one process
+    "": {"interface": "virtual", "channel": "contract", "rate": 100},  # devices and driver in one process
     "master": {"lost_after": 10.0},
     "monitoring": {"missed_cycles": 1000, "sync_gap": 10.0, "state_change": 10.0, "heartbeats": 100},
 }

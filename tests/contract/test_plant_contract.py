@@ -22,7 +22,7 @@ PLANTS: dict[str, tuple[str, ...]] = {
     "integrator": (str(HERE.parent / "plant_node" / "integrator_plant.py"),),
     "sim": ("hydraulic_sim.nodes.simulator",),
 }
-RATE = ("-p", "rate:=250.0")  # low, so that the collecting test process keeps up on a busy machine
+RATE = ("-p", "rate:=100.0")  # low, so that the collecting test process keeps up on a busy machine
 # Long enough for a source in a loaded test process not to be taken for silent.
 PATIENT = ("-p", "watchdog:=2.0")
 PLANT = "/actuator/plant"
@@ -108,7 +108,7 @@ def test_lifecycle_round_trip(start: Any, client: Any, wait_until: Any) -> None:
         assert not enable(client).success, "an inactive plant must not be enabled"
         assert client.change_state("activate")
         before = len(states)
-        wait_until(lambda n=before: len(states) > n + 100, "states of an active plant")
+        wait_until(lambda n=before: len(states) > n + 50, "states of an active plant")
         assert client.change_state("deactivate")
         assert applied(states) == 0.0
         assert client.change_state("cleanup")
@@ -140,7 +140,7 @@ def test_samples_share_stamps_on_the_grid(start: Any, client: Any, wait_until: A
     begun = client.node.get_clock().now().nanoseconds
     start()
     common = wait_until(
-        partial(shared_stamps, streams, 300), "300 successive samples of which every topic has its part"
+        partial(shared_stamps, streams, 100), "100 successive samples of which every topic has its part"
     )
     steps = {b - a for a, b in zip(common, common[1:], strict=False)}
     assert all(step > 0 and step % 1_000_000 == 0 for step in steps)
@@ -284,7 +284,7 @@ def test_emergency_stop_is_latched_until_reset_and_enable(start: Any, client: An
     assert not enable(client).success
     assert trigger(client, "reset").success
     at_reset = len(states)
-    wait_until(lambda: len(states) > at_reset + 200, "states after the reset")
+    wait_until(lambda: len(states) > at_reset + 50, "states after the reset")
     assert {state.effort[1] for state in states[stopped:]} == {0.0}, "reset alone must not move anything"
     assert enable(client).success
     wait_until(lambda: applied(states) == 0.5, "the drive after reset and enable")
@@ -334,7 +334,7 @@ def test_parameters_are_described_and_guarded(start: Any, client: Any, wait_unti
 def test_diagnostics_report_timing(start: Any, client: Any, wait_until: Any) -> None:
     health = client.diagnostics()
     start()
-    wait_until(lambda: health.count("samples") > 200, "some samples")
+    wait_until(lambda: health.count("samples") > 50, "some samples")
     wait_until(lambda: float(health["rate_Hz"] or "nan") > 0.0, "a rate")
     values = health.values()
     assert float(values["rate_Hz"]) > 0.0 and float(values["run_jitter_p99_ms"]) >= 0.0

@@ -13,6 +13,7 @@ import pytest
 
 SCRIPT = Path(__file__).parent / "integrator_plant.py"
 PLANT = "/actuator/plant"
+RATE = ("-p", "rate:=200.0")  # low, so that the collecting test process keeps up on a busy machine
 HARDWARE = f"can{os.getpid()}"  # of this process alone: other tests run at the same time
 
 
@@ -27,7 +28,8 @@ def start(launch: Any, journal: Path, monkeypatch: pytest.MonkeyPatch) -> Callab
 
     def run(*ros: str, autostart: bool = True) -> Any:
         options = ["--autostart"] if autostart else []
-        return launch(SCRIPT, *options, "--ros-args", "-p", f"journal:={journal}", "-p", "watchdog:=2.0", *ros)
+        given = ("-p", f"journal:={journal}", "-p", "watchdog:=2.0", *RATE, *ros)
+        return launch(SCRIPT, *options, "--ros-args", *given)
 
     return run
 

@@ -14,13 +14,14 @@ from hydraulic_sim.plant import Plant
 
 PLANT = "/actuator/plant"
 MODEL = "sample_bench"
+RATE = 200.0  # low, so that the collecting test process keeps up on a busy machine
 
 
 @pytest.fixture
 def start(launch: Any, compiled_physics: None) -> Callable[..., Any]:
     def run(*parameters: str, autostart: bool = True) -> Any:
         options = ["--autostart"] if autostart else []
-        given = [f"model:={MODEL}", "watchdog:=2.0", "enable_on_activate:=true", *parameters]
+        given = [f"model:={MODEL}", f"rate:={RATE}", "watchdog:=2.0", "enable_on_activate:=true", *parameters]
         return launch("hydraulic_sim.nodes.simulator", *options, "--ros-args", *[x for p in given for x in ("-p", p)])
 
     return run
@@ -37,7 +38,7 @@ def set_parameter(client: Any, name: str, value: float | str) -> Any:
 def arrays(states: list[Any]) -> dict[str, np.ndarray]:
     """Columns of state messages up to the first gap in the stamps."""
     stamps = np.array([from_time(m.header.stamp) for m in states])
-    whole = int(np.argmax(np.append(np.diff(stamps) != 1_000_000, True))) + 1
+    whole = int(np.argmax(np.append(np.diff(stamps) != round(1e9 / RATE), True))) + 1
     rows = states[:whole]
     return {
         "stamp_ns": stamps[:whole],
@@ -59,18 +60,18 @@ def test_the_topics_carry_what_the_model_computes(start: Any, client: Any, wait_
     source = client.source("hand", 2.0)
     wait_until(lambda: states[-1].effort[1] == 2.0, "the drive")
     source.drive = -3.0
-    wait_until(lambda: states[-1].effort[1] == -3.0 and len(states) > 500, "the other drive")
+    wait_until(lambda: states[-1].effort[1] == -3.0 and len(states) > 150, "the other drive")
     heard = arrays(list(states))
-    assert len(heard["drive"]) > 400
+    assert len(heard["drive"]) > 100
     plant = Plant(load_model(MODEL))
     # A collector that joined late would have missed the rest before the drive, during which nothing happens.
-    simulated = plant.simulate(heard["drive"], 1e-3, plant.initial_state(position=0.1))
+    simulated = plant.simulate(heard["drive"], 1.0 / RATE, plant.initial_state(position=0.1))
     for channel in ("position", "velocity", "force"):
         assert heard[channel] == pytest.approx(simulated[channel], rel=1e-6, abs=1e-9 * np.ptp(simulated[channel]))
     assert heard["spool"] == pytest.approx(simulated.spool * plant.value("spool_travel"), rel=1e-6, abs=1e-9)
     at = {int(stamp): k for k, stamp in enumerate(heard["stamp_ns"])}
     both = [(at[stamp], m.fluid_pressure) for m in list(pressures) if (stamp := from_time(m.header.stamp)) in at]
-    assert len(both) > 400
+    assert len(both) > 100
     assert [p for _, p in both] == pytest.approx(simulated.pressure_a[[k for k, _ in both]], rel=1e-6)
 
 
@@ -123,11 +124,11 @@ def test_limit_switches_close_at_the_stops(start: Any, client: Any, wait_until: 
 def test_sensor_noise_and_resolution(start: Any, client: Any, wait_until: Any) -> None:
     states, pressures = client.collect("state"), client.collect("pressure_b")
     start("position_noise:=1e-5", "position_resolution:=2e-6", "pressure_noise:=2e4", "noise_seed:=7")
-    wait_until(lambda: len(states) > 1500 and len(pressures) > 1500, "samples at rest")
-    position = arrays(list(states))["position"][:1500]
+    wait_until(lambda: len(states) > 800 and len(pressures) > 800, "samples at rest")
+    position = arrays(list(states))["position"][:800]
     assert np.std(position) == pytest.approx(1e-5, rel=0.15)
     assert position / 2e-6 == pytest.approx(np.round(position / 2e-6), abs=1e-6)
-    pressure = np.array([m.fluid_pressure for m in pressures[:1500]])
+    pressure = np.array([m.fluid_pressure for m in pressures[:800]])
     assert np.std(pressure) == pytest.approx(2e4, rel=0.15)
     assert abs(np.corrcoef(pressure[:-1], pressure[1:])[0, 1]) < 0.1, "white"
 
@@ -142,7 +143,7 @@ def test_effects_can_be_switched_on_and_off_while_it_runs(start: Any, client: An
     health, states = client.diagnostics(), client.collect("state")
     start("model:=moog_mcr_m_1002_bench")
     client.source("hand", 0.3)
-    wait_until(lambda: len(states) > 200 and states[-1].velocity[0] > 5e-3, "the piston to move")
+    wait_until(lambda: len(states) > 50 and states[-1].velocity[0] > 5e-3, "the piston to move")
     assert set_parameter(client, "extra_effects", "{valve_deadband: {width: 0.05}, supply_droop: }").successful
     wait_until(lambda: abs(states[-1].velocity[0]) < 1e-3, "the piston to stand within the dead band")
     wait_until(lambda: "valve_deadband, supply_droop" in health["effects"], "the effects in the diagnostics")

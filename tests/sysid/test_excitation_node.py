@@ -16,7 +16,7 @@ from hydraulic_sysid.excitation import Plan, save_plan
 from hydraulic_sysid.excitation.signals.chirp import Chirp
 
 PLANT = Path(__file__).parent / "excitation_plant.py"
-RATE = 250.0  # low, so that the collecting test process keeps up on a busy machine
+RATE = 125.0  # low, so that the collecting test process keeps up on a busy machine
 # A loaded machine may hold the node up for longer than the bench's watchdog allows.
 PATIENT = ("-p", "watchdog:=1.0")
 IN_LOCKSTEP = ("-p", "lockstep:=true")  # however long an answer takes

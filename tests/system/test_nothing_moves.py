@@ -21,8 +21,8 @@ from hydraulic_interfaces.samples import Reference
 INTEGRATOR = Path(__file__).parents[1] / "plant_node" / "integrator_plant.py"  # moves with the first drive
 SIMULATOR = "hydraulic_sim.nodes.simulator"
 HARDWARE = f"can{os.getpid()}"  # of this process alone: other tests run at the same time
-PATIENT = ("watchdog:=2.0", "rate:=250.0")  # a busy machine may let nobody speak for a while
-ENOUGH = 250
+PATIENT = ("watchdog:=2.0", "rate:=125.0")  # a busy machine may let nobody speak for a while
+ENOUGH = 125
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ pytest.importorskip("rclpy")
 
 PLAN = "plan-first_look"
 WATCHDOG_S = 0.05
-RATE = 250.0
+RATE = 125.0
 PERIOD_NS = round(1e9 / RATE)
 
 

@@ -70,7 +70,9 @@ class Bench:
     def open(self, address: str = "", width: int = 1360, height: int = 860, dark: bool = False, tab: str = "") -> Any:
         """A new page, with nothing remembered."""
         scheme = "dark" if dark else "light"
-        context = self.browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+        context = self.browser.new_context(
+            viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion="reduce"
+        )
         context.add_init_script(COUNT_INPUT)
         self.contexts.append(context)
         page = context.new_page()

@@ -1,4 +1,4 @@
-"""The workbench for a test that waits for a whole search: all its processes run as long as the slowest of them.
+"""The workbench for tests of what a page shows and does, not of how fast: others run beside them.
 
 The jobs do not give way to others, and the simulator has an eighth of the usual rate.
 """
