@@ -28,7 +28,8 @@ def start(launch: Any, journal: Path, monkeypatch: pytest.MonkeyPatch) -> Callab
 
     def run(*ros: str, autostart: bool = True) -> Any:
         options = ["--autostart"] if autostart else []
-        given = ("-p", f"journal:={journal}", "-p", "watchdog:=2.0", *RATE, *ros)
+        rate = () if any(one.startswith("rate:=") for one in ros) else RATE
+        given = ("-p", f"journal:={journal}", "-p", "watchdog:=2.0", *rate, *ros)
         return launch(SCRIPT, *options, "--ros-args", *given)
 
     return run
