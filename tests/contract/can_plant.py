@@ -1,4 +1,4 @@
-"""The CAN driver's node and virtual devices over the simulated actuator, in one process; takes the node's arguments.
+"""The CAN driver's node and virtual devices over a cylinder of a few lines, in one process; takes the node's arguments.
 
 The bus file is the shipped one with more patience: what is tested here is the contract, on a machine that may be busy.
 """
@@ -19,10 +19,8 @@ from hydraulic_can_driver.nodes import can_driver
 from hydraulic_can_driver.virtual import Reading, VirtualBench
 from hydraulic_can_driver.virtual.faults import StatusFault
 from hydraulic_can_driver.virtual.wiring import Event
-from hydraulic_sim.live import LivePlant
-from hydraulic_sim.model_file import load_model
-from hydraulic_sim.plant import Plant
 
+GAIN, HALF_STROKE = 0.02, 0.5  # (m/s)/V, m
 CHANGES: dict[str, dict[str, Any]] = {
     "": {"interface": "virtual", "channel": "contract", "rate": 100},  # devices and driver in one process
     "master": {"lost_after": 10.0},
@@ -30,16 +28,18 @@ CHANGES: dict[str, dict[str, Any]] = {
 }
 
 
-class Actuator:
-    """The physics of a model file behind virtual devices."""
+class Cylinder:
+    """The velocity follows the drive at once; between stops, and at pressures that hardly change."""
 
-    def __init__(self, model: str) -> None:
-        self._live = LivePlant(Plant(load_model(model)))
+    def __init__(self) -> None:
+        self._position, self._velocity = 0.0, 0.0
 
     def step(self, drive: float, dt: float) -> Reading:
         """See `hydraulic_can_driver.virtual.Plant`."""
-        now = self._live.step(drive, dt)
-        return Reading(now.position, now.velocity, now.pressure_a, now.pressure_b, now.pressure_supply, now.spool)
+        now = Reading(self._position, self._velocity, 7e6 + 1e4 * drive, 7e6 - 1e4 * drive, 14e6, drive / 10.0)
+        self._velocity = GAIN * drive
+        self._position = min(max(self._position + self._velocity * dt, -HALF_STROKE), HALF_STROKE)
+        return now
 
 
 def patient_file(folder: Path, changes: dict[str, dict[str, Any]] = CHANGES) -> Path:
@@ -68,7 +68,7 @@ def main() -> int:
         bus = load_bus(path)
         fault = StatusFault("valve")
         lockstep = "--lockstep" in sys.argv
-        with VirtualBench(bus, open_can(bus.interface, bus.channel), Actuator("sample_bench"), lockstep) as devices:
+        with VirtualBench(bus, open_can(bus.interface, bus.channel), Cylinder(), lockstep) as devices:
             devices.listeners.append(tell)
             signal.signal(signal.SIGUSR1, lambda *_: devices.inject(fault))
             signal.signal(signal.SIGUSR2, lambda *_: devices.clear(fault))

@@ -63,14 +63,14 @@ def plant_source(model: Model, rate: float) -> PlantSource:
     :raises EffectError: an effect that C cannot be written of; names its file and line.
     :raises SimulationError: the rate is too fast for the memory of an effect.
     """
+    active = [e for e in model.library.values() if e.name in model.effects or e.always_on]
+    scope, parts = _functions(active)  # first, as it compiles nothing
     plant = Plant(model)
     plant.simulate([0.0], 1.0 / rate)  # refuses a rate that a memory cannot follow
     layout = plant.layout
-    active = [e for e in layout.library.values() if e.name in model.effects or e.always_on]
     names = {e.name for e in active}
     known = {f"on[{i}]": float(name in names) for name, i in layout.effects.items()}
     known |= {"hydraulic": float(model.kind == "hydraulic"), "seen": 0.0, "every": 0.0}  # nothing is seen of it
-    scope, parts = _functions(active)
     scope |= {"NX": len(layout.states), "NR": layout.n_rates}
     module = compose.write_module(layout.library)
     for name, python, text in (("relax", "relax", module), ("run", "integrate", module), ("see", "see", _see(layout))):
