@@ -27,7 +27,7 @@ from .candidates import observed
 from .data_sheet import priors, significant
 from .errors import DiagnosisError
 from .frozen_jacobian import refit_rounded
-from .holdout import MOST_VALUES, QUICK_VALUES, Split, split
+from .holdout import Split, split
 from .linearisation import Linearisation
 from .misfit import SIGNIFICANT, Misfit, material, misfit
 from .progress import Progress, Watch
@@ -98,10 +98,9 @@ class Fitting:
         model = bounded(model)
         length = settings.seconds(model, [*records, *validation])
         try:
-            most = QUICK_VALUES if quick else MOST_VALUES
-            cuts = split(records, validation, model, length, most)
+            cuts = split(records, validation, model, length, quick)
             quarter = shorter(length, SHORTER, [*records, *validation])
-            short = partial(split, records, validation, model, quarter, most)
+            short = partial(split, records, validation, model, quarter, quick)
             progress = Progress(say, within, watch or (lambda _: None))
             return cls(Task(model, cuts, short, replace(settings, length=length), progress, quick))
         except SegmentError as error:

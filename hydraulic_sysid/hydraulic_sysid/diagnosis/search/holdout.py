@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, inf
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -28,7 +28,8 @@ from .set_aside import SetAside, set_aside
 BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
 MOST_VALUES = 80_000  # measured values of all segments, spread: 27 s of three channels at 1 kHz; more hardly say more …
-QUICK_VALUES = 24_000  # … and for an answer in seconds: eight; what is small is missed
+QUICK_VALUES = 24_000  # … and for an answer in seconds; what is small is missed, …
+QUICK_SECONDS = 8.0  # … and of fewer channels or at lower rates so many seconds: a fit takes as long over them
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
 LOPSIDED = 4.0  # times what the values of one role leave beyond the noise, from which the other has seen little of it
@@ -120,16 +121,17 @@ class Split:
 
 
 def split(
-    records: Sequence[Record], validation: Sequence[Record], model: Model, length: float, most: int = MOST_VALUES
+    records: Sequence[Record], validation: Sequence[Record], model: Model, length: float, quick: bool = False
 ) -> Split:
     """Cut ``records`` and those for ``validation`` into segments of ``length`` seconds, what is `set_aside` left out.
 
-    Records with more than the ``most`` values that are used are taken at a lower rate, as far as the model's resonance
-    allows, and of what is still more blocks are left out.
+    Records with more than `MOST_VALUES`, or for a ``quick`` answer `QUICK_VALUES`, are taken at a lower rate, as far as
+    the model's resonance allows, and of what is still more, or longer, blocks are left out.
 
     :raises hydraulic_sysid.estimation.errors.SegmentError: a record cannot be cut.
     """
     every = [*records, *validation]
+    most, longest = (QUICK_VALUES, QUICK_SECONDS) if quick else (MOST_VALUES, inf)
     for record in every:
         record.require("drive", "position", error=SegmentError)
     masks, aside = set_aside(model, every, length)
@@ -137,7 +139,7 @@ def split(
     slow = [slower(r, k) for r, k in zip(every, factors, strict=True)]
     masks = [_reduced(m, k, len(r)) for m, k, r in zip(masks, factors, slow, strict=True)]
     cuts = cut(slow, model.kind, length, left_out=masks)
-    segments, used = _thinned(cuts, most)
+    segments, used = _thinned(cuts, most, longest)
     if validation:
         return Split(segments, [np.full(len(s), i < len(records)) for s, i in zip(segments, used, strict=True)], aside)
     # Shifted from record to record, so that not always the same phase of an experiment is for validation.
@@ -163,9 +165,10 @@ def _reduced(left_out: Mask, factor: int, count: int) -> Mask:
     return np.asarray(maximum_filter1d(left_out, 3 * factor)[: count * factor : factor])
 
 
-def _thinned(segments: list[Segments], most: int) -> tuple[list[Segments], list[int]]:
-    """One block in so many of all records, where there are more than the ``most`` values; of which records they are."""
-    every = ceil(sum(s.measured.size for s in segments) / most)
+def _thinned(segments: list[Segments], most: int, longest: float) -> tuple[list[Segments], list[int]]:
+    """One block in so many of all records, of more than the ``most`` values or the ``longest``; of which they are."""
+    seconds = sum(len(s) * s.samples * s.record.dt for s in segments)
+    every = ceil(max(sum(s.measured.size for s in segments) / most, seconds / longest))
     kept, used, before = [], [], 0
     for i, s in enumerate(segments):
         # Blocks are counted on from record to record, so that not the first one of each is kept.
