@@ -20,7 +20,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose, verdict
-from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_SECONDS, split
+from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_LEAST, QUICK_SECONDS, split
 from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError
 from hydraulic_sysid.diagnosis.search.remainder import Spikes
 from hydraulic_sysid.diagnosis.search.search import Search
@@ -338,10 +338,12 @@ def test_of_very_long_records_blocks_are_left_out(model: Model) -> None:
     assert time.size - segments.first[-1] <= np.diff(segments.first).max()  # evenly, up to the end
 
 
+@pytest.mark.parametrize("names", [("position",), tuple(NOISE)], ids=["position", "pressures, too"])
 @pytest.mark.parametrize("dt", [1e-3, 4e-3])
-def test_for_a_quick_answer_a_few_seconds_do_however_often_they_are_sampled(model: Model, dt: float) -> None:
+def test_for_a_quick_answer_a_few_seconds_do_that_hold_enough(model: Model, dt: float, names: tuple[str, ...]) -> None:
     time = dt * np.arange(round(60.0 / dt))
-    channels = {c: np.sin(time) for c in ("drive", "position")}
-    quick = split([Record.sampled("long", dt, channels)], (), model, 0.5, quick=True)
-    seconds = [len(s) * s.samples * s.record.dt for s in quick.segments]
-    assert 0.6 * QUICK_SECONDS < sum(seconds) < 1.2 * QUICK_SECONDS
+    record = Record.sampled("long", dt, {c: np.sin(time) for c in ("drive", *names)})
+    used = split([record], (), model, 0.5, quick=True).segments
+    seconds, values = sum(len(s) * s.samples * dt for s in used), sum(s.measured.size for s in used)
+    assert values > 0.9 * QUICK_LEAST
+    assert seconds < 1.2 * QUICK_SECONDS or values < 1.3 * QUICK_LEAST

@@ -21,7 +21,7 @@ from hydraulic_sim.model_file import Model, load_model, save_model
 from hydraulic_sysid.diagnosis.calibrate import FitSettings
 from hydraulic_sysid.diagnosis.proposed_effect import propose
 from hydraulic_sysid.diagnosis.search import diagnose
-from hydraulic_sysid.diagnosis.search.holdout import QUICK_SECONDS, QUICK_VALUES
+from hydraulic_sysid.diagnosis.search.holdout import QUICK_LEAST, QUICK_SECONDS, QUICK_VALUES
 from hydraulic_sysid.verbs import _diagnosis_table
 from hydraulic_sysid.verbs import _options as opt
 
@@ -51,8 +51,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--quick",
         action="store_true",
-        help=f"use {QUICK_VALUES} measured values or {QUICK_SECONDS:g} s, whichever is less, spread over all records, "
-        "and leave out what only confirms: an answer in seconds, which misses what is small",
+        help=f"use about {QUICK_SECONDS:g} s ({QUICK_LEAST} to {QUICK_VALUES} values), spread over all records, and "
+        "leave out what only confirms: an answer in seconds, which misses what is small",
     )
     parser.add_argument(
         "--propose",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil, inf
+from math import ceil
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -29,7 +29,8 @@ BLOCK = 3  # segments in a row that have the same role
 EVERY = 3  # one block in so many is for validation
 MOST_VALUES = 80_000  # measured values of all segments, spread: 27 s of three channels at 1 kHz; more hardly say more …
 QUICK_VALUES = 24_000  # … and for an answer in seconds; what is small is missed, …
-QUICK_SECONDS = 8.0  # … and of fewer channels or at lower rates so many seconds: a fit takes as long over them
+QUICK_SECONDS = 8.0  # … and of fewer channels or at lower rates so many seconds, over which a fit takes as long, …
+QUICK_LEAST = 6_000  # … that hold so many values
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
 LOPSIDED = 4.0  # times what the values of one role leave beyond the noise, from which the other has seen little of it
@@ -131,15 +132,14 @@ def split(
     :raises hydraulic_sysid.estimation.errors.SegmentError: a record cannot be cut.
     """
     every = [*records, *validation]
-    most, longest = (QUICK_VALUES, QUICK_SECONDS) if quick else (MOST_VALUES, inf)
     for record in every:
         record.require("drive", "position", error=SegmentError)
     masks, aside = set_aside(model, every, length)
-    factors = _factors(model, every, masks, length, most)
+    factors = _factors(model, every, masks, length, QUICK_VALUES if quick else MOST_VALUES)
     slow = [slower(r, k) for r, k in zip(every, factors, strict=True)]
     masks = [_reduced(m, k, len(r)) for m, k, r in zip(masks, factors, slow, strict=True)]
     cuts = cut(slow, model.kind, length, left_out=masks)
-    segments, used = _thinned(cuts, most, longest)
+    segments, used = _thinned(cuts, quick)
     if validation:
         return Split(segments, [np.full(len(s), i < len(records)) for s, i in zip(segments, used, strict=True)], aside)
     # Shifted from record to record, so that not always the same phase of an experiment is for validation.
@@ -165,10 +165,12 @@ def _reduced(left_out: Mask, factor: int, count: int) -> Mask:
     return np.asarray(maximum_filter1d(left_out, 3 * factor)[: count * factor : factor])
 
 
-def _thinned(segments: list[Segments], most: int, longest: float) -> tuple[list[Segments], list[int]]:
-    """One block in so many of all records, of more than the ``most`` values or the ``longest``; of which they are."""
+def _thinned(segments: list[Segments], quick: bool) -> tuple[list[Segments], list[int]]:
+    """One block in so many of all records, where there is more than is used; of which records they are."""
+    values = sum(s.measured.size for s in segments)
     seconds = sum(len(s) * s.samples * s.record.dt for s in segments)
-    every = ceil(max(sum(s.measured.size for s in segments) / most, seconds / longest))
+    times = max(values / QUICK_VALUES, min(seconds / QUICK_SECONDS, values // QUICK_LEAST))
+    every = ceil(times if quick else values / MOST_VALUES)
     kept, used, before = [], [], 0
     for i, s in enumerate(segments):
         # Blocks are counted on from record to record, so that not the first one of each is kept.

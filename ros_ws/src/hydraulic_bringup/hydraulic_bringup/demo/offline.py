@@ -66,10 +66,12 @@ def read_bag(bag: Path, steps: Steps, most: float) -> list[Record]:
     return even
 
 
-def analyse(records: list[Record], test_records: list[Record], model: Model, out: Path, steps: Steps) -> Analysis:
+def analyse(
+    records: list[Record], test_records: list[Record], model: Model, out: Path, steps: Steps, quick: bool = False
+) -> Analysis:
     """Identify on ``records`` (tested on ``test_records`` or the last fifth); compare the model with all of them.
 
-    Then say what the model lacks, and write the model that has it.
+    Then say what the model lacks, by a ``quick`` diagnosis or a full one, and write the model that has it.
 
     :raises DemoError: a step failed.
     """
@@ -92,9 +94,9 @@ def analyse(records: list[Record], test_records: list[Record], model: Model, out
         raise DemoError("compare", str(error), "give records with drive and position that are long enough") from None
     results.write_result(out, compared)
     steps.done()
-    steps.begin("diagnose", 10.0 + 5.0 * len(every))
+    steps.begin("diagnose", 5.0 if quick else 10.0 + 5.0 * len(every))
     try:
-        diagnosis = diagnose(model, every, progress=lambda _: steps.tick())
+        diagnosis = diagnose(model, every, progress=lambda _: steps.tick(), quick=quick)
     except (DiagnosisError, SimulationError) as error:
         raise DemoError("diagnose", str(error), "give records with drive and position that are long enough") from None
     results.write_result(out, diagnosis.result)

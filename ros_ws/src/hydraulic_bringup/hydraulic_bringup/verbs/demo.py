@@ -112,7 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--plant", choices=tuple(online.PLANTS), help="what is excited (default sim)")
     parser.add_argument("--out", metavar="DIR", type=Path, help="new folder of the run (default runs/<date>-demo)")
     parser.add_argument("--workbench", action="store_true", help="open the result in the workbench when it is there")
-    parser.add_argument("--quick", action="store_true", help="experiments of a few seconds")
+    parser.add_argument("--quick", action="store_true", help="experiments of a few seconds, and a quick diagnosis")
     parser.add_argument(
         "--lockstep",
         action=argparse.BooleanOptionalAction,
@@ -145,7 +145,7 @@ def _run(options: argparse.Namespace, console: Console) -> Path:
             bags = online.run(options.plant, as_built, experiments, out, steps, options.lockstep)
             most = 0.0 if options.lockstep else offline.MOST_MISSING[options.plant]
             records, test_records = (offline.read_bag(bag, steps, most) for bag in bags)
-            analysis = offline.analyse(records, test_records, model, out, steps)
+            analysis = offline.analyse(records, test_records, model, out, steps, options.quick)
     _print(analysis, console)
     console.print(f"\n{time.monotonic() - begun:.0f} s. Open the report: [bold]{analysis.page}[/bold]", soft_wrap=True)
     return out
