@@ -48,7 +48,6 @@ def test_a_hidden_effect_is_named_and_added_within_twelve_clicks(page: Any, pict
     page.wait_for_selector("#abort")
     until(page, "workbench.state.bench.experiment.progress > 0.3")
     picture(page, "loop-4-running")
-    page.evaluate("workbench.state.quick = true")  # a page shows what a full search finds as it does this
     page.click('#next:has-text("Diagnose this record")')
     page.wait_for_selector("table.candidates tbody tr")  # fills while the search runs
     assert page.locator("#cancel-job").count() == 1
