@@ -28,8 +28,7 @@ def start(launch: Any, journal: Path, monkeypatch: pytest.MonkeyPatch) -> Callab
 
     def run(*ros: str, autostart: bool = True) -> Any:
         options = ["--autostart"] if autostart else []
-        rate = () if any(one.startswith("rate:=") for one in ros) else RATE
-        given = ("-p", f"journal:={journal}", "-p", "watchdog:=2.0", *rate, *ros)
+        given = ("-p", f"journal:={journal}", "-p", "watchdog:=2.0", *RATE, *ros)
         return launch(SCRIPT, *options, "--ros-args", *given)
 
     return run
@@ -332,8 +331,8 @@ def test_parameters_known_after_configure(start: Any, client: Any, wait_until: A
 
 
 @pytest.mark.parametrize("bad", ["rate:=-5.0", "rate:=fast", "watchdog:=.nan", "realtime_priority:=200"])
-def test_a_bad_parameter_is_one_clear_line(start: Any, bad: str) -> None:
-    process = start("-p", bad)
+def test_a_bad_parameter_is_one_clear_line(launch: Any, bad: str) -> None:
+    process = launch(SCRIPT, "--ros-args", "-p", bad)
     assert process.wait() == 2
     assert "Traceback" not in process.output()
     assert bad.partition(":")[0] in process.output()

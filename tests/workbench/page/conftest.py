@@ -25,6 +25,7 @@ FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
+EAGER = Path(__file__).with_name("eager_workbench.py")
 PICTURES = Path(__file__).parents[3] / "runs" / "page_pictures"
 COUNT_INPUT = """
     window.counted = {clicks: 0, keys: 0};
@@ -99,7 +100,7 @@ class Bench:
 def start_bench(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Bench]]:
     """Starts a workbench in a ROS domain of its own: `start_bench("--hide", "valve_deadband")`.
 
-    ``program``: a script that runs it in another way.
+    ``eager``: as `eager_workbench` runs it.
     """
     folder = tmp_path_factory.mktemp("workbench")
     started: list[Process] = []
@@ -107,8 +108,8 @@ def start_bench(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iter
     environment.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
     environment.setenv("PYTHONUNBUFFERED", "1")
 
-    def start(*arguments: str, program: Path | None = None) -> Bench:
-        started_by = [str(program)] if program else ["-m", "hydraulic_workbench.nodes.workbench"]
+    def start(*arguments: str, eager: bool = False) -> Bench:
+        started_by = [str(EAGER)] if eager else ["-m", "hydraulic_workbench.nodes.workbench"]
         command = [sys.executable, *started_by, "--no-browser"]
         command += ["--folder", str(folder / f"bench_{len(started)}"), *arguments]
         started.append(Process(command, folder / f"bench_{len(started)}.log"))

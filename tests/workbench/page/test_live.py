@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from page_steps import hidden_part, start_simulator, until
 
-EAGER = Path(__file__).with_name("eager_workbench.py")
-
 
 @pytest.fixture(scope="module")
 def bench(start_bench: Callable[..., Any]) -> Iterator[Any]:
-    yield start_bench(program=EAGER)
+    yield start_bench(eager=True)
 
 
 @pytest.fixture(scope="module")

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from page_steps import figure, hidden_part, until
 
-EAGER = Path(__file__).with_name("eager_workbench.py")
 MOST_CLICKS = 12
 AT_THE_NOISE = 1.1
 SHRUNK = 0.5  # the residual beside the plant with the effect, over that without
@@ -23,7 +21,7 @@ RESIDUAL = """model => {
 
 @pytest.fixture(scope="module")
 def bench(start_bench: Callable[..., Any]) -> Iterator[Any]:
-    yield start_bench("--hide", "valve_deadband", program=EAGER)
+    yield start_bench("--hide", "valve_deadband", eager=True)
 
 
 @pytest.fixture(scope="module")
