@@ -22,7 +22,8 @@ from .trajectory import PlantState, Trajectory
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
 STOPS = "end_stop"
-FIT_STEP, FIT_REFINEMENT = 1e-3, 2.2  # half as fine: off by a hundredth of the sensors' noise on all benches tried
+# s, and how much longer than otherwise: off by a hundredth of the sensors' noise on all benches tried
+FIT_STEP, FIT_REFINEMENT = {"hydraulic": 1e-3, "mechanical": 5e-3}, 2.2
 YIELDS = {"hydraulic": 1e-5, "mechanical": 1e-4}  # of the stroke, by the full force: less than sensors of such see
 HEAVY = 1e6
 _OF_FORCES = ("moving_mass", "drive_force", "bristle_length", "bristle_time")  # base parameters of forces alone
@@ -93,7 +94,7 @@ class Plant:
             enough = force / (YIELDS[model.kind] * values["stroke"])
             if values[key] > enough >= model.parameter(key).bounds[0]:
                 model = model.with_values({key: enough})
-        return cls(model, FIT_STEP, FIT_REFINEMENT)
+        return cls(model, FIT_STEP[model.kind], FIT_REFINEMENT)
 
     @property
     def fastest(self) -> tuple[str, float, float]:

@@ -56,6 +56,7 @@ def test_what_no_library_knows_is_proposed_joined_and_explains_the_records(bench
     assert diagnose([*command, "--quick", "--propose", str(effect), "--apply", "--out", str(bench / "before")]) == 1
     found = document(bench / "before", "diagnose")
     assert found["verdict"]["kind"] == "outside the library", found["verdict"]["text"]
+    assert found["verdict"]["text"].endswith("A quick look: what is small may be missed.")
     proposed = found["proposed_effect"]
     assert (proposed["subsystem"], proposed["variable"], proposed["beside"]) == ("flow", "position", [])
     assert proposed["explained_share"] > 0.9

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 import pytest
 
+from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
@@ -35,6 +36,7 @@ from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
 from hydraulic_sysid.diagnosis.search.worth import anything
 from hydraulic_sysid.estimation.fit import Fit, FitSettings
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
+from hydraulic_sysid.estimation.shooting import Shooting
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.segments import Segments
@@ -90,6 +92,20 @@ def test_a_limit_that_is_reached_far_from_where_it_is_looked_for_is_found(model:
     refits = [refit(at, model.with_effect(name), start) for start in (found.start, *found.others)]
     best = min(refits, key=lambda r: sum(float(c.sum()) for c in r.costs))
     assert best.model.value(f"{name}.limit") == pytest.approx(0.46, rel=0.02)
+
+
+def test_what_runs_from_no_start_is_left_where_it_changes_nothing(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The library's usual size may ask for steps a thousand times as short: nothing that is fitted later begins there."""
+    at = Linearisation.of(model, split([swept(model)], [], model, 0.5))
+
+    def too_stiff(*_: object) -> None:
+        raise SimulationError("the physics asks for steps of 1 us")
+
+    monkeypatch.setattr(Shooting, "try_out", too_stiff)
+    found = refit(at, model.with_effect("entrained_air"), {"entrained_air.fraction": 0.03})
+    assert found.costs is at.costs and found.model.value("entrained_air.fraction") == 0.0
 
 
 def test_what_a_model_bends_to_explain_the_same_counts_against_it() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hydraulic_sim.model import Model
+from hydraulic_sim.model import Entry, Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
@@ -94,6 +94,21 @@ def test_a_rest_against_a_stop_counts_only_where_the_model_has_it(
     inward = recorded(true_position[0], 0.95 * true_position[1])
     (stop,) = (f for f in contradictions(model, [inward]) if f.kind == "stop")
     assert stop.severity == "doubtful" and abs(stop.measured or 0.0) == pytest.approx(0.95 * 0.5 * STROKE, rel=0.01)
+
+
+def test_a_servo_that_sticks_short_of_its_command_rests_against_no_stop() -> None:
+    """Its drive is where it is told to be: 5 mrad beyond where friction holds it, and far beyond a stop."""
+    values = {"moving_mass": 0.1, "drive_force": 0.3, "drive_limit": 10.0, "stroke": 3.0}
+    entries = {key: Entry(value) for key, value in values.items()}
+    servo = Model("servo", entries, ("end_stop", "position_loop"), kind="mechanical")
+    told = np.interp(np.arange(12_000) % 6000, [0, 1000, 3000, 4000], [0.35, 0.65, 0.65, 0.35])
+    held = np.clip(0.9 * told, 0.33, 0.58) + NOISE * np.random.default_rng(7).standard_normal(told.size)
+    stuck, against = (
+        Record.sampled(name, DT, {"drive": command, "position": held})
+        for name, command in (("stuck", told), ("against", 3.0 * told))
+    )
+    assert set_aside(servo, [stuck], 0.5)[1] == []
+    assert STOP in {a.reason for a in set_aside(servo, [against], 0.5)[1]}
 
 
 def test_small_motion_far_from_the_stops_is_no_rest(model: Model) -> None:

@@ -24,7 +24,8 @@ T = TypeVar("T")
 
 _NUDGE = 1e-6  # of the mass: no propagation knows it any better
 _MOST_KNOWN = 256  # propagations along a record that are kept
-_STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not follow a parameter to
+_STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not follow a parameter to, …
+_ANYWAY = 2.5e-4  # s … unless they are as long as that
 _STEP = 2e-3  # difference step of a parameter, of its value, …
 _LEAST_STEP = 0.1  # … or of so much of its scale
 _NEAR_STOP = 0.05  # of the stroke: what goes no nearer to an end of it stays clear of the stop
@@ -102,7 +103,7 @@ class Shooting:
 
         :raises hydraulic_sim.errors.SimulationError: it does not run, or is so stiff that fits stay away from it.
         """
-        if plant.longest_step * _STIFFEST < self.plant.longest_step:
+        if plant.longest_step < min(self.plant.longest_step / _STIFFEST, _ANYWAY):
             raise SimulationError(
                 f"{plant.model.name!r}: the physics asks for steps of {plant.longest_step:.2g} s, at the beginning of "
                 f"the fit for {self.plant.longest_step:.2g} s"

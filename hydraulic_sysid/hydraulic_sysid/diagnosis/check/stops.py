@@ -1,7 +1,7 @@
 """Stops where the piston rests, against those of the model.
 
-A piston that rests at an end of its travel while the valve is open towards it stands against a stop. Where the model
-has its stop elsewhere, the zero of the position, its scale or the stroke is off.
+A piston that rests at an end of its travel while the valve is open towards it, or that is told to go far beyond, stands
+against a stop. Where the model has its stop elsewhere, the zero of the position, its scale or the stroke is off.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from hydraulic_sysid.estimation.segments import unjudged
 from .finding import DOUBTFUL, Finding
 from .travel import TOUCH, readings_at_stops
 
-OPEN = 0.05  # of full opening, beyond any overlap: a valve that drives the piston against what it rests at
+# Of full opening, beyond any overlap: a valve that drives the piston against what it rests at. Of the stroke: a command
+# beyond where friction and a load hold a servo
+OPEN = 0.05
 HELD = 1.5  # times the friction of the model, which a piston without oil may rest under
 SMOOTH = 25  # parts of a segment, over one of which a position is averaged
 STILL = 0.2  # of what a stop gives way: what a piston at rest may seem to move
@@ -49,7 +51,8 @@ def other_stops(model: Model, records: Sequence[Record], length: float) -> list[
     if "stroke" not in model.entries:
         return []
     plant = Plant(model)
-    touch, opened = TOUCH * model.value("stroke"), _open(plant)
+    stroke = model.value("stroke")
+    touch, opened = TOUCH * stroke, OPEN * stroke if plant.closes_a_loop else _open(plant)
     smooth = [_smoothed(r, length) for r in records]
     judged = [x[unjudged(r) :] for x, r in zip(smooth, records, strict=True)]
     ends = min(float(x.min()) for x in judged), max(float(x.max()) for x in judged)
@@ -59,7 +62,7 @@ def other_stops(model: Model, records: Sequence[Record], length: float) -> list[
         rests = [
             (r, slice(a, b))
             for r, at in zip(records, near, strict=True)
-            for a, b in runs(at & (side * r["drive"] > opened))
+            for a, b in runs(at & (side * _towards(plant, r) > opened))
             if (b - a) * r.dt >= LONG * length and _stands(r["position"][a:b], STILL * touch)
         ]
         clipped = any(at_end_of_range(r["position"])[where].any() for r, where in rests[:1])
@@ -81,6 +84,14 @@ def wrong_stops(model: Model, records: Sequence[Record], length: float) -> list[
         names = tuple(r.name for r, at in zip(records, one.near, strict=True) if at.any())
         found.append(Finding("stop", "position", DOUBTFUL, text, remedy, one.at, one.stated, "m", names))
     return found
+
+
+def _towards(plant: Plant, record: Record) -> Array:
+    """What drives the piston (N,) [V]; where it follows a commanded position, by how far that lies ahead [m].
+
+    Friction and loads hold such a piston short of where it is told to be: at rest it need not stand against anything.
+    """
+    return np.asarray(record["drive"] - record["position"]) if plant.closes_a_loop else record["drive"]
 
 
 def _open(plant: Plant) -> float:

@@ -33,6 +33,7 @@ BALANCED = 40.0  # s of all records together of which balances are formed where 
 SHORT = 4.0  # … and at least of each
 BALANCED_SAMPLES = 100_000  # of all records together, whatever is done: this bounds the memory
 SAMPLED = 60  # segments that are kept of what is left
+HASTE = "A quick look: what is small may be missed."
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,8 @@ def diagnose(
         known = parameter_errors(found.final.linearisation, tolerances(found.model))
         whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
         whole["settings"] = {**whole["settings"], "quick": quick}
+        if quick:
+            whole["verdict"]["text"] += f" {HASTE}"
         done = as_filed(finished(found, known), model)
         competing = {
             name: as_filed(search.with_exact_laws(other, found.split, competing=True), model)

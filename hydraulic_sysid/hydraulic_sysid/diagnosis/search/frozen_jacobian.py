@@ -45,11 +45,15 @@ class Refit:
 
 
 def refit(at: Linearisation, model: Model, start: Mapping[str, float]) -> Refit:
-    """Fit ``model``, which has the linearisation's effects and more, from its values and ``start`` [SI, by key]."""
+    """Fit ``model``, which has the linearisation's effects and more, from its values and ``start`` [SI, by key].
+
+    Where it does not run from there, it is that of the linearisation: what it has more changes nothing.
+    """
     own = tuple(k for k in start if model.entry(k).free)
     begin = _begin(at, model, start, own)
     if begin is None:
-        return Refit(model, at.costs)
+        nothing = {k: null for k in own if (null := model.parameter(k).null) is not None}
+        return Refit(model.with_values({**start, **nothing}), at.costs)
     point = minimise(begin, _MOST_STEPS, _FLAT).point
     values = {**start, **point.parameters.by_key}
     return Refit(model.with_values(values, source="fitted"), point.at_rest(_ROUNDS).costs)

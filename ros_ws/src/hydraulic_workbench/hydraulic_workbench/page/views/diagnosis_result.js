@@ -87,7 +87,6 @@ export function diagnosisResult(doc, job) {
         ${canApply ? html`<button id="apply" ?disabled=${!operates() || anyRuns()} @click=${() => applyVerdict(job.run)}>Take the model of the verdict</button>` : nothing}
         <button id="next-experiment" ?disabled=${!operates() || anyRuns() || doc.model_files.length < 2}
           title=${doc.model_files.length < 2 ? "These records leave one model: there is nothing to tell apart" : "Design the experiment that tells the candidates apart"} @click=${() => nextExperiment(job)}>Next experiment</button>
-        ${doc.settings?.quick ? html`<span class="soft small">A quick look: what is small may be missed.</span>` : nothing}
         ${stale ? html`<span class="soft small">The model has changed since.</span>` : nothing}</div>`}
       ${dataSheet(doc)}${recording(doc)}${findings(doc)}
     </section>
