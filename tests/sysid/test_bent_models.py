@@ -36,10 +36,10 @@ from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
 from hydraulic_sysid.diagnosis.search.worth import anything
 from hydraulic_sysid.estimation.fit import Fit, FitSettings
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
-from hydraulic_sysid.estimation.shooting import Shooting
 from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.segments import Segments
+from hydraulic_sysid.estimation.shooting import Shooting
 
 DT, SECONDS = 1e-3, 6.0
 CAPACITY = 2e-14  # m³/Pa, a twenty-fifth of what the library takes a hose for
@@ -97,7 +97,7 @@ def test_a_limit_that_is_reached_far_from_where_it_is_looked_for_is_found(model:
 def test_what_runs_from_no_start_is_left_where_it_changes_nothing(
     model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The library's usual size may ask for steps a thousand times as short: nothing that is fitted later begins there."""
+    """The library's usual size may ask for steps a thousand times as short: no later fit begins there."""
     at = Linearisation.of(model, split([swept(model)], [], model, 0.5))
 
     def too_stiff(*_: object) -> None:
