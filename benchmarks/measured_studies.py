@@ -51,6 +51,8 @@ def main(argv: list[str] | None = None) -> int:
         if given == study.EXCERPT:
             print(f"{options.set}: the shipped excerpt alone; for all of it give a folder: {where(study.SOURCE)}")
         rows = study.study(data_folder(study.SOURCE, given, out / "data"), work)
+        if not rows:
+            raise StudyError(f"{options.set}: no machine {options.machine!r}; there are: {', '.join(work.machines)}")
     except HydraulicError as error:
         print(error, file=sys.stderr)
         return 2

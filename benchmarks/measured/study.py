@@ -99,7 +99,9 @@ class Work:
     quick: bool = False
     """Without what takes minutes: long searches, and all of a set beyond one machine."""
     machine: str | None = None
-    """Of a set with several machines this one alone."""
+    """Of a set with several machines this one alone, …"""
+    machines: list[str] = field(default_factory=list)
+    """… and all that it has, as they are asked for."""
     say: Callable[[str], None] = print
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -127,7 +129,8 @@ class Work:
 
     def wanted(self, machine: str, quick: str) -> bool:
         """Whether a machine of a set is to be studied; ``quick`` is the one of a quick study."""
-        return machine == (self.machine or (quick if self.quick else machine))
+        self.machines.append(machine)
+        return machine == (self.machine or (quick if self.quick else machine)).lower()
 
     def picture(
         self, name: str, series: Sequence[tuple[str, Array, dict[str, Array]]], unit: str, along: str = "s"

@@ -119,6 +119,8 @@ class Writer:
             return f"M[{place.start}:{place.stop}]"
         if argument in {p.name for p in base.PARAMETERS}:
             return self.parameter(argument)
+        if effect.slot == "command" and argument in ("dt", "interval"):
+            return {"dt": "held", "interval": "dt"}[argument]
         if argument == "command" and not slots.SLOTS[effect.slot].per_sample and effect.slot != "loop":
             return "demand"
         return argument
@@ -158,6 +160,18 @@ class Writer:
                 f"    {', '.join(lefts)} = {self.call(effect, 'dynamics')}",
             ]
         return "\n".join(lines) if lines else "pass"
+
+    def cut(self) -> str:
+        """Where in a sample the command changes, and how many parts it has."""
+        lines = ["cut = 0.0"]
+        for effect in self.members("command"):
+            if effect.shift:
+                key = f"{effect.name}.{effect.shift}"
+                lines += [
+                    f"if on[{self.layout.effects[effect.name]}]:",
+                    f"    cut = beyond_whole({self.parameter(key)}, dt)",
+                ]
+        return "\n".join([*lines, "parts = 2 if cut > 0.0 else 1"])
 
     def switches(self) -> str:
         """One flag per stage, so that a stage without effects costs one test."""
@@ -209,9 +223,9 @@ def places(layout: Layout) -> dict[str, object]:
     return {
         "stick": stick, "n_rates": layout.n_rates, "n_states": len(layout.states), "constants1": w.constants(),
         "switches1": w.switches(), "rhs1": rhs, "rhs4": rhs, "bend": REVERSAL_BEND, "shorter": REVERSAL_STEP,
-        "most": MOST_SUBSTEPS, "command": shared["command"], "position_sensor": shared["position_sensor"],
-        "pressure_sensor": shared["pressure_sensor"], "position_sensor7": shared["position_sensor"],
-        "pressure_sensor7": shared["pressure_sensor"],
+        "most": MOST_SUBSTEPS, "command": shared["command"], "cut1": w.cut(),
+        "position_sensor": shared["position_sensor"], "pressure_sensor": shared["pressure_sensor"],
+        "position_sensor7": shared["position_sensor"], "pressure_sensor7": shared["pressure_sensor"],
     }  # fmt: skip
 
 

@@ -11,7 +11,9 @@ A kernel is an ordinary function of scalars; numba compiles it. Its *argument na
 - a base parameter (`base.PARAMETERS`), such as ``moving_mass``;
 - a parameter of another effect, declared in ``uses`` as ``{"argument": "effect.parameter"}`` (zero while that
   effect is off);
-- in the per-sample slots, ``memory`` (the effect's own array) and ``dt`` [s].
+- in the per-sample slots, ``memory`` (the effect's own array) and ``dt`` [s], for how long what it returns holds;
+- of an effect on the command, the sampling ``interval`` [s] and how far ``into`` it the sample is [s]: 0, or where an
+  effect with a ``shift`` has the command change within a sample.
 """
 
 from __future__ import annotations
@@ -89,9 +91,11 @@ class Effect:
     (for a relaxation state two: its rate and its target). ``memory`` is the number of values kept between samples.
     ``order`` sorts effects within a slot. ``step_rate`` estimates the fastest rate [1/s] that the effect brings, from
     parameters alone, so that the integrator's step can follow it; ``reach`` says how far back [s] its memory must go
-    (one value per sample; without it the memory may keep what is long past). ``begins_shown``: the memory of a position
-    sensor may begin as if all had always moved like now (memory[0] is 0), or with what the sensor showed (memory[0] is
-    −1, memory[1] that [m], memory[2] its noise over the usual acceleration [s²]). ``always_on`` marks base physics.
+    (one value per sample; without it the memory may keep what is long past); ``shift`` names the parameter [s] by which
+    it moves the command, and by whose part of a sampling interval what it returns changes within one.
+    ``begins_shown``: the memory of a position sensor may begin as if all had always moved like now (memory[0] is 0), or
+    with what the sensor showed (memory[0] is −1, memory[1] that [m], memory[2] its noise over the usual acceleration
+    [s²]). ``always_on`` marks base physics.
     ``wear`` says what of a machine ages where the effect grows; empty where nothing does.
     ``alike_without_pressures`` names the family whose members drive and position alone cannot distinguish. ``kinds``:
     of plants in which it can act. ``searched``: whether a diagnosis may find it missing; how a machine is built
@@ -115,6 +119,7 @@ class Effect:
     order: int = 0
     step_rate: Callable | None = None
     reach: Callable | None = None
+    shift: str = ""
     begins_shown: bool = False
     always_on: bool = False
     wear: str = ""

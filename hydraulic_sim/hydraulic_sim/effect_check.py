@@ -14,7 +14,8 @@ from .units import conversion
 
 # Signals of a plant in plain motion; what can have either sign is tried with both, and at rest.
 ALWAYS_POSITIVE = {"pressure_a": 6e6, "pressure_b": 5e6, "pressure_supply": 14e6, "pressure_tank": 1e5,
-                   "volume_a": 1e-3, "volume_b": 1e-3, "viscosity": 1.0, "t": 0.5, "dt": 1e-3}  # fmt: skip
+                   "volume_a": 1e-3, "volume_b": 1e-3, "viscosity": 1.0, "t": 0.5, "dt": 1e-3,
+                   "interval": 1e-3, "into": 0.0}  # fmt: skip
 EITHER_SIGN = {"position": 0.01, "velocity": 0.02, "pressure_difference": 1e6, "load_pressure": 1e6,
                "flow_supply": 1e-4, "flow_tank": 1e-4, "direction": 1.0}  # fmt: skip
 

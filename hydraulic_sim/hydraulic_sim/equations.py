@@ -83,7 +83,7 @@ import math
 import numpy as np
 from numba import njit
 from hydraulic_sim.compiled import RUN
-from hydraulic_sim.kernels import clamp, orifice_gain
+from hydraulic_sim.kernels import beyond_whole, clamp, orifice_gain
 
 {functions}
 
@@ -128,12 +128,14 @@ def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydrauli
     """Integrates X over len(drive) samples; Y[k] is what is seen at sample k. Returns the samples done.
 
     Every so many samples, if any, the first states are set to what was seen of them; then Y is one row, written anew.
-    A substep is at most max_step long, and max_turn over the fastest rate of the oil through the lands.
+    A substep is at most max_step long, and max_turn over the fastest rate of the oil through the lands. A sample in
+    which the command changes has two parts, the first as long as the ``cut``.
     failure: time, substeps in the failing sample (0: not finite, else: too stiff for the step)."""
     {constants1}
     {switches1}
     S = np.empty(NX); K = np.zeros(NX); R = np.zeros(NX - NR); G = np.zeros(NX - NR)
     slope = np.empty(NR); rates = np.empty(NX - NR); goals = np.empty(NX - NR)
+    {cut1}
     row = 0
     for k in range(len(drive)):
         if every != 0:
@@ -141,77 +143,80 @@ def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydrauli
                 correct(X, seen, k)
         else:
             row = k
-        now = start + k * dt
-        t = now
-        command = clamp(drive[k] / drive_limit, -1.0, 1.0)
-        position = X[0]; velocity = X[1]; pressure_a = X[2]; pressure_b = X[3]
-        pressure_difference = pressure_a - pressure_b
-        load_pressure = pressure_a - pressure_b * area_ratio
-        {command}
         remaining = dt
         count = 0
-        while remaining > 0.0:
-            h = 0.0
-            span = 0.0
-            for stage in range(4):
-                if stage == 0:
-                    for i in range(NX):
-                        S[i] = X[i]
-                else:
-                    span = h if stage == 3 else 0.5 * h
-                    for i in range(NR):
-                        S[i] = X[i] + span * K[i]
-                    for i in range(NX - NR):
-                        S[NR + i] = relax(X[NR + i], R[i], G[i], span)
-                now = start + k * dt + (dt - remaining) + span
-                {rhs4}
-                if stage == 0:
-                    wanted = max_step
-                    if pressure_rate * wanted > max_turn:
-                        wanted = max_turn / pressure_rate
-                    # a reversal of dry friction bends the trajectory: cross it in short steps
-                    swing = abs(K[1]) * wanted
-                    if any_direction and abs(velocity) < 2.0 * swing and swing * wanted > {bend} * bristle_length:
-                        wanted *= {shorter}
-                    if wanted < remaining:
-                        h = remaining / math.ceil(remaining / wanted * 0.999999)
+        for part in range(parts):
+            into = cut * part
+            held = dt - cut if part == parts - 1 else cut
+            until = dt - into - held
+            now = start + k * dt + into
+            t = now
+            command = clamp(drive[k] / drive_limit, -1.0, 1.0)
+            position = X[0]; velocity = X[1]; pressure_a = X[2]; pressure_b = X[3]
+            pressure_difference = pressure_a - pressure_b
+            load_pressure = pressure_a - pressure_b * area_ratio
+            {command}
+            while remaining > until:
+                h = 0.0
+                span = 0.0
+                for stage in range(4):
+                    if stage == 0:
+                        for i in range(NX):
+                            S[i] = X[i]
                     else:
-                        h = remaining
-                    if count == 0:
-                        reading = position
-                        if any_position_sensor:
-                            {position_sensor7}
-                        reading_a = pressure_a; reading_b = pressure_b
-                        if any_pressure_sensor:
-                            {pressure_sensor7}
-                        Y[row, 0] = reading; Y[row, 1] = velocity; Y[row, 2] = reading_a; Y[row, 3] = reading_b
-                        Y[row, 4] = pressure_supply; Y[row, 5] = spool; Y[row, 6] = position
-                        Y[row, 7] = pressure_a; Y[row, 8] = pressure_b; Y[row, 9] = opening
-                    for i in range(NR):
-                        slope[i] = K[i]
-                    for i in range(NX - NR):
-                        rates[i] = R[i]; goals[i] = R[i] * G[i]
-                else:
-                    weight = 1.0 if stage == 3 else 2.0
-                    for i in range(NR):
-                        slope[i] += weight * K[i]
-                    for i in range(NX - NR):
-                        rates[i] += weight * R[i]; goals[i] += weight * R[i] * G[i]
-            total = 0.0
-            for i in range(NR):
-                X[i] += h / 6.0 * slope[i]
-                total += X[i]
-            for i in range(NX - NR):
-                if rates[i] > 0.0:
-                    X[NR + i] = relax(X[NR + i], rates[i] / 6.0, goals[i] / rates[i], h)
-            remaining = remaining - h if remaining - h > 1e-9 * dt else 0.0
-            count += 1
-            if not math.isfinite(total):
-                failure[0] = now; failure[1] = 0.0
-                return k
-            if count >= {most} * max(1.0, 1e3 * dt):
-                failure[0] = now; failure[1] = count
-                return k
+                        span = h if stage == 3 else 0.5 * h
+                        for i in range(NR):
+                            S[i] = X[i] + span * K[i]
+                        for i in range(NX - NR):
+                            S[NR + i] = relax(X[NR + i], R[i], G[i], span)
+                    now = start + k * dt + (dt - remaining) + span
+                    {rhs4}
+                    if stage == 0:
+                        wanted = max_step
+                        if pressure_rate * wanted > max_turn:
+                            wanted = max_turn / pressure_rate
+                        # a reversal of dry friction bends the trajectory: cross it in short steps
+                        swing = abs(K[1]) * wanted
+                        if any_direction and abs(velocity) < 2.0 * swing and swing * wanted > {bend} * bristle_length:
+                            wanted *= {shorter}
+                        h = remaining - until
+                        if wanted < h:
+                            h = h / math.ceil(h / wanted * 0.999999)
+                        if count == 0:
+                            reading = position
+                            if any_position_sensor:
+                                {position_sensor7}
+                            reading_a = pressure_a; reading_b = pressure_b
+                            if any_pressure_sensor:
+                                {pressure_sensor7}
+                            Y[row, 0] = reading; Y[row, 1] = velocity; Y[row, 2] = reading_a; Y[row, 3] = reading_b
+                            Y[row, 4] = pressure_supply; Y[row, 5] = spool; Y[row, 6] = position
+                            Y[row, 7] = pressure_a; Y[row, 8] = pressure_b; Y[row, 9] = opening
+                        for i in range(NR):
+                            slope[i] = K[i]
+                        for i in range(NX - NR):
+                            rates[i] = R[i]; goals[i] = R[i] * G[i]
+                    else:
+                        weight = 1.0 if stage == 3 else 2.0
+                        for i in range(NR):
+                            slope[i] += weight * K[i]
+                        for i in range(NX - NR):
+                            rates[i] += weight * R[i]; goals[i] += weight * R[i] * G[i]
+                total = 0.0
+                for i in range(NR):
+                    X[i] += h / 6.0 * slope[i]
+                    total += X[i]
+                for i in range(NX - NR):
+                    if rates[i] > 0.0:
+                        X[NR + i] = relax(X[NR + i], rates[i] / 6.0, goals[i] / rates[i], h)
+                remaining = remaining - h if remaining - until - h > 1e-9 * dt else until
+                count += 1
+                if not math.isfinite(total):
+                    failure[0] = now; failure[1] = 0.0
+                    return k
+                if count >= {most} * max(1.0, 1e3 * dt):
+                    failure[0] = now; failure[1] = count
+                    return k
     return len(drive)
 
 
@@ -229,11 +234,15 @@ def prime(drive, dt, start, on, P, X, M):
     position = X[0]; velocity = X[1]; pressure_a = X[2]; pressure_b = X[3]
     pressure_difference = pressure_a - pressure_b
     load_pressure = pressure_a - pressure_b * area_ratio
+    {cut1}
     if any_command:
         for k in range(len(drive)):
-            t = start + k * dt
-            command = clamp(drive[k] / drive_limit, -1.0, 1.0)
-            {command}
+            for part in range(parts):
+                into = cut * part
+                held = dt - cut if part == parts - 1 else cut
+                t = start + k * dt + into
+                command = clamp(drive[k] / drive_limit, -1.0, 1.0)
+                {command}
 
 
 @njit("void(f8, f8[::1], f8, f8, u1[::1], f8[::1], u1)", cache=True, nogil=True, error_model="numpy")

@@ -39,11 +39,17 @@ def play(value: float, half_width: float, held: float) -> float:
 
 
 @njit(error_model="numpy")
+def beyond_whole(span: float, interval: float) -> float:
+    """What is left of a ``span`` beyond whole intervals; 0 where that is next to nothing."""
+    left = span - interval * int(span / interval + 1e-6)
+    return left if left > 1e-6 * interval else 0.0
+
+
+@njit(error_model="numpy")
 def delayed(value: float, delay: float, dt: float, memory) -> float:
     """``value`` delayed by ``delay`` [s], interpolated linearly between samples ``dt`` [s] apart.
 
-    memory[0] counts samples, memory[1:] is a ring. For an input held over each sample the interpolation is the
-    mean of the delayed signal over the sample. The ring bounds the delay: the longest is (len(memory) − 3)·dt.
+    memory[0] counts samples, memory[1:] is a ring. It bounds the delay: the longest is (len(memory) − 3)·dt.
     """
     size = len(memory) - 1
     count = int(memory[0])

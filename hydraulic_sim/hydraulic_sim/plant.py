@@ -16,7 +16,7 @@ from .effect import Effect, arguments
 from .embedded import Embedded
 from .errors import SimulationError
 from .model import Model
-from .slots import PER_SAMPLE, SLOTS
+from .slots import OF_COMMAND, PER_SAMPLE, SLOTS
 from .trajectory import PlantState, Trajectory
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
@@ -381,7 +381,7 @@ class Plant:
         inner = self._inner_effects
         if self.closes_a_loop:
             return None
-        alone = {"command", "t", *PER_SAMPLE}
+        alone = {"command", "t", *PER_SAMPLE, *OF_COMMAND}
         for e in inner:
             own = {p.name for p in e.parameters} | {s.name for s in e.states}
             taken = arguments(e.dynamics) if e.dynamics else arguments(e.kernel)

@@ -205,7 +205,7 @@ def _check_slot(effect: Effect, path: Path) -> None:
 
 def _check(effect: Effect, path: Path, found: Library) -> None:
     own = {p.name for p in effect.parameters} | {s.name for s in effect.states}
-    taken = own & (set(slots.SIGNALS) | set(slots.PER_SAMPLE) | {p.name for p in base.PARAMETERS})
+    taken = own & (set(slots.SIGNALS) | {*slots.PER_SAMPLE, *slots.OF_COMMAND} | {p.name for p in base.PARAMETERS})
     if taken:
         raise EffectError(f"{path}: the names {sorted(taken)} belong to signals or base parameters")
     for alias, key in effect.uses.items():
@@ -223,6 +223,7 @@ def _check(effect: Effect, path: Path, found: Library) -> None:
                 or slots.known_at(stage, argument)
                 or (which == "kernel" and slot.kind == "chain" and argument in slot.returns)
                 or (slot.per_sample and which == "kernel" and argument == "dt")
+                or (effect.slot == "command" and which == "kernel" and argument in slots.OF_COMMAND)
                 or (effect.memory and which == "kernel" and argument == "memory")
                 or argument in {p.name for p in base.PARAMETERS}
             ):

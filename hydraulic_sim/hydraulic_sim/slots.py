@@ -85,6 +85,8 @@ SIGNALS: dict[str, tuple[int, str]] = {
 }
 STATE_SIGNALS = ("t", "position", "velocity", "pressure_a", "pressure_b", "pressure_difference", "load_pressure")
 PER_SAMPLE = ("memory", "dt")
+OF_COMMAND = ("interval", "into")
+"""What else an effect on the command may ask for."""
 
 
 def known_at(slot: str, signal: str) -> bool:

@@ -63,6 +63,13 @@ def test_a_set_that_is_not_shipped_asks_for_its_folder(name: str, tmp_path: Path
     assert STUDIES[name].SOURCE.repository in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["bam", "so101"])
+def test_a_machine_that_a_set_does_not_have_is_refused(name: str, tmp_path: Path, capsys) -> None:
+    assert measured_studies.main([name, "--machine", "mx64", "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert "no machine 'mx64'" in said and ("sts3250" if name == "bam" else "elbow") in said
+
+
 def test_a_folder_without_the_data_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match=r"no 0A\.txt in it"):
         data_folder(STUDIES["mts"].SOURCE, tmp_path, tmp_path / "unpacked")

@@ -102,7 +102,7 @@ def _functions(active: list[Effect]) -> tuple[dict[str, Any], list[str]]:
     scope: dict[str, Any] = {"math": math, "np": numpy}
     parts: list[str] = []
     shared: dict[int, Called] = {}
-    for name in ("orifice_gain", "clamp"):
+    for name in ("orifice_gain", "clamp", "beyond_whole"):
         scope[name] = _translated(getattr(kernels, name), f"kernel_{name}", 1, shared, parts, "kernels.py")
     for effect in active:
         for which, function in effect.functions().items():
