@@ -326,20 +326,34 @@ def test_a_delay_of_whole_samples_is_a_shift(hydraulic: Build, samples: int) -> 
     assert read.position[samples:] == pytest.approx(read.true_position[:-samples], abs=1e-15)
 
 
-def test_a_delay_between_samples_is_their_mean_by_parts(hydraulic: Build) -> None:
-    drive = noise(200)
-    run = hydraulic(command_delay={"delay": 2.25 * DT}).simulate(drive, DT)
-    assert run.spool[3:] == pytest.approx((0.75 * drive[1:-2] + 0.25 * drive[:-3]) / 10.0, abs=1e-12)
-    assert run.spool[0] == drive[0] / 10.0
-
-
-def test_a_delay_does_not_depend_on_the_sampling(hydraulic: Build) -> None:
-    """The same drive, held over 1 ms, sampled at 1 ms and at 0.25 ms."""
-    model = hydraulic(command_delay={"delay": 6e-3}, sensor_delay={"delay": 3e-3}).model
+@pytest.mark.parametrize("delay", [6e-3, 6.25e-3, 6.75e-3])
+def test_a_delay_does_not_depend_on_the_sampling(hydraulic: Build, delay: float) -> None:
+    """The same drive, held over 1 ms, sampled at 1 ms and at 0.25 ms; the delay may end within a sample."""
+    model = hydraulic(command_delay={"delay": delay}, sensor_delay={"delay": 3e-3}).model
     plant, drive = Plant(model, longest_step=2.5e-4), noise(150)
     coarse, fine = plant.simulate(drive, DT), plant.simulate(np.repeat(drive, 4), DT / 4)
     assert fine.position[::4] == pytest.approx(coarse.position, abs=1e-12)
     assert fine.spool[::4] == pytest.approx(coarse.spool, abs=1e-12)
+    assert coarse.spool[7:] == pytest.approx(drive[:-7] / 10.0 if delay > 6e-3 else drive[1:-6] / 10.0, abs=1e-12)
+
+
+def test_what_comes_behind_a_delay_goes_on_within_a_sample(hydraulic: Build) -> None:
+    """A play follows every value, a limited rate goes on for as long as each value holds."""
+    behind = {"valve_hysteresis": {"half_width": 0.05}, "spool_rate_limit": {"rate": 200.0}}
+    plant, drive = Plant(hydraulic(command_delay={"delay": 2.5 * DT}, **behind).model, longest_step=2.5e-4), noise(150)
+    coarse, fine = plant.simulate(drive, DT), plant.simulate(np.repeat(drive, 2), DT / 2)
+    assert fine.position[::2] == pytest.approx(coarse.position, abs=1e-12)
+
+
+def test_memories_are_primed_over_delays_that_end_within_a_sample(hydraulic: Build) -> None:
+    behind = {"valve_hysteresis": {"half_width": 0.05}}
+    plant, drive = hydraulic(command_delay={"delay": 2.5 * DT}, **behind), noise(150)
+    whole = plant.simulate(drive, DT)
+    at = 60
+    states = plant.initial_state().states
+    states[:4] = [whole[name][at] for name in ("true_position", "velocity", "true_pressure_a", "true_pressure_b")]
+    part = plant.predict(drive, DT, [at], 50, states[None])["position"][0]
+    assert part == pytest.approx(whole.position[at : at + 51], abs=1e-9)
 
 
 @pytest.mark.parametrize("effect", ["command_delay", "sensor_delay"])

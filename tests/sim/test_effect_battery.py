@@ -135,7 +135,7 @@ ON_THE_COMMAND = [e for e in EFFECTS if e.slot == "command"]
 
 @pytest.mark.parametrize("effect", ON_THE_COMMAND, ids=ids(ON_THE_COMMAND))
 def test_effects_on_the_command_are_continuous_in_it(effect: Effect) -> None:
-    values = {p.name: p.default for p in effect.parameters} | {"dt": DT}
+    values = {p.name: p.default for p in effect.parameters} | {"dt": DT, "interval": DT, "into": 0.0}
 
     def after(command: float) -> float:
         memory = np.zeros(effect.memory)
