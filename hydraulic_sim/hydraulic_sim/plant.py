@@ -206,13 +206,7 @@ class Plant:
     @property
     def bristle_length(self) -> float:
         """The sliding distance over which dry friction turns [m], as effects leave it."""
-        known = {name: self.value(name) for name in SLOTS["bristle"].returns}
-        for e in self._active:
-            if e.slot == "bristle":
-                own = {p.name: self.value(f"{e.name}.{p.name}") for p in e.parameters}
-                given = {**known, **own}
-                known.update(zip(known, e.kernel(*(given[a] for a in arguments(e.kernel))), strict=True))
-        return known["bristle_length"]
+        return rates.bristles(self._active, self._values())["bristle_length"]
 
     def initial_state(
         self,

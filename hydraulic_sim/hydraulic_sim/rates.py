@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from .effect import Effect
+from .effect import Effect, arguments
+from .slots import SLOTS
 
 STEP_TIMES_RATE = 0.6  # how much of the fastest stated rate one step may cover; RK4 is stable up to 2.7
 STEP_TIMES_LANDS = 1.2  # and of the rate of the oil through the lands, which damps and is looked at in every step
@@ -21,11 +22,22 @@ def by_cause(effects: Iterable[Effect], values: Mapping[str, float], kind: str) 
 
     A fit may try values beyond the bounds: the root of a negative stiffness is a rate of growth.
     """
-    found = {"oil": oil(values)} if kind == "hydraulic" else {}
+    found, effects = {"oil": oil(values)} if kind == "hydraulic" else {}, list(effects)
+    values = {**values, **bristles(effects, values)}
     for effect in effects:
         if effect.step_rate is not None:
             found[effect.name] = abs(effect.step_rate({**values, **_own(effect, values)}))
     return found
+
+
+def bristles(effects: Iterable[Effect], values: Mapping[str, float]) -> dict[str, float]:
+    """Length [m] and time [s] of the bristles of dry friction, as the effects leave them (`slots.SLOTS`)."""
+    known = {name: values[name] for name in SLOTS["bristle"].returns}
+    for e in effects:
+        if e.slot == "bristle":
+            given = {**known, **{p.name: values[f"{e.name}.{p.name}"] for p in e.parameters}}
+            known.update(zip(known, e.kernel(*(given[a] for a in arguments(e.kernel))), strict=True))
+    return known
 
 
 def step(rate: float, longest: float, refinement: float = 1.0) -> float:
