@@ -22,19 +22,22 @@ from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.refinement import outlying
 
 from .candidate_fits import LATER_REFITS
+from .candidates import candidates
+from .competing_models import competing_models
 from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
 from .fitting import FAR_OFF, Task, quieter, retimed, spiked
 from .force_balance import drives_by_force, force_shares
 from .force_curves import Forces
+from .frozen_jacobian import Refit
 from .linearisation import Linearisation
 from .misfit import SMALL, Misfit, explained, material
 from .nonparametric_curves import NonparametricCurve, nonparametric_curves
 from .progress import OutOfTimeError
 from .recording_fits import RIVAL, RecordingFits
 from .score_test import CandidateScore, score
-from .search_state import SearchResult, SearchState
+from .search_state import CandidateRefit, SearchResult, SearchState
 from .set_aside import accidents
 from .spectral_lines import record_features
 from .worth import (
@@ -55,6 +58,8 @@ from .worth import (
 
 MOST_EFFECTS = 6
 MOST_SWAPS = 3
+SAME = 0.9  # collinearity of a rival with an effect, from which it cannot leave far more, …
+MOST_STUCK = 2  # … and how many such are fitted anew
 
 
 class Search(RecordingFits):
@@ -86,7 +91,8 @@ class Search(RecordingFits):
         :raises OutOfTimeError: before there was anything.
         """
         try:
-            concluded = self.concluded(decisive(self.searched()), others=not self.quick)
+            searched = self.rivals_begun_anew(decisive(self.searched()))
+            concluded = self.concluded(searched, others=not self.quick)
             concluded = self.set_against_effect(self.set_against_faults(concluded))
             found = accidents_named(self.by_force(concluded))
             if found.added and found.base.scores:  # not those beside the effects that were found last
@@ -96,6 +102,37 @@ class Search(RecordingFits):
             if not self.path:
                 raise
             return self.so_far()
+
+    def rivals_begun_anew(self, found: SearchResult) -> SearchResult:
+        """With rivals that change the same as an effect that was added, and yet left far more, begun where that ended.
+
+        Their quick refits began where the model was bent to what it lacked, and from there may have led nowhere.
+        """
+        competing = dict(found.competing)
+        for name, without in found.competing.items():
+            rivals = competing_models(name, without, found.final.misfit)
+            stuck = {c.name for c in rivals if c.distinguishable and c.collinearity > SAME}
+            if not stuck:
+                continue
+            with suppress(SimulationError):  # it does not run without the effect
+                bare = self.as_it_is(found.final.linearisation.model.without_effect(name))
+                at = bare.linearisation
+                effects = [e for e in candidates(bare.model) if e.name in stuck]
+                scores = score(at, effects, record_features(at))
+                again = [self._begun_at(bare, s) for s in scores[:MOST_STUCK]]
+                best = {r.name: r for r in without.refits}
+                for r in again:
+                    best[r.name] = min(best[r.name], r, key=lambda one: one.misfit.total)
+                refits = sorted(best.values(), key=lambda r: r.misfit.total)
+                competing[name] = replace(without, refits=refits)
+        return replace(found, competing=competing)
+
+    def _begun_at(self, bare: SearchState, candidate: CandidateScore) -> CandidateRefit:
+        """A candidate fitted to the end, from where its score is best on this state."""
+        name = candidate.effect.name
+        self.say(f"fitting with {name} once more")
+        state = self.state(bare.model.with_effect(name).with_values(candidate.start), self._last)
+        return CandidateRefit(name, Refit(state.model, state.linearisation.costs), state.misfit)
 
     def by_force(self, found: SearchResult) -> SearchResult:
         """With the effect that explains the force which is left, where a sensor shows more than any law is right to.
