@@ -20,11 +20,12 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose, verdict
+from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_LEAST, QUICK_SECONDS, split
 from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError
 from hydraulic_sysid.diagnosis.search.remainder import Spikes
 from hydraulic_sysid.diagnosis.search.search import Search
-from hydraulic_sysid.diagnosis.search.search_state import SearchResult
+from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult
 from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.report import render
 
@@ -220,6 +221,24 @@ def test_what_was_found_is_the_best_so_far_where_the_time_ends_in_what_follows(
     found = search.so_far()
     assert found.stopped and found.added == ["sensor_delay", "valve_deadband"]
     assert found.final.model.effects == known.model.effects
+
+
+def test_a_rival_that_was_stuck_begins_once_more_where_the_search_ended(model: Model) -> None:
+    """While the piston moves, a friction that is larger one way is a load; its quick refit, here, has led nowhere."""
+    loaded = model.with_effect("constant_load", {"load": 900.0})
+    search = Search.of(model, records(driven(loaded)), [], FitSettings(), lambda _: None)
+    base, final = search.begin(), search.state(loaded)
+    refits = [
+        CandidateRefit(name, Refit(base.model.with_effect(name, {key: value}), base.linearisation.costs), base.misfit)
+        for name, key, value in (("friction_asymmetry", "difference", -100.0), ("sensor_delay", "delay", 1e-3))
+    ]
+    own = CandidateRefit("constant_load", Refit(final.model, final.linearisation.costs), final.misfit)
+    without, misfits = replace(base, refits=[own, *refits]), {"constant_load": final.misfit}
+    found = SearchResult(model, search.split, search.settings, without, final, misfits, {"constant_load": without})
+    again = search.rivals_begun_anew(found).competing["constant_load"].refits
+    assert [r.name for r in again] == ["constant_load", "friction_asymmetry", "sensor_delay"]
+    assert again[1].misfit.excess < 0.02 * base.misfit.excess
+    assert again[2] is refits[1]  # it changes something else
 
 
 def test_the_values_of_a_model_are_those_of_its_laws_as_they_stand(model: Model, runs) -> None:
