@@ -38,10 +38,10 @@ JOINTS = {"pitch": "gravity_pendulum", "elbow": "gravity_pendulum", "rotation": 
 BESIDE = (("a dead time", "sensor_delay.delay", "ms"), ("a gap", "sensor_backlash.half_gap", "mrad"))
 
 
-def motion(folder: Path, name: str, joint: str) -> Record:
-    """The first 40 s of one joint in one motion."""
+def motion(folder: Path, name: str, joint: str, seconds: float = SECONDS) -> Record:
+    """The first seconds of one joint in one motion."""
     (record,) = read_records(folder / name / "control.csv", f"so101_{joint}")
-    return record.window(0.0, SECONDS) if record.duration > SECONDS + 0.1 else record
+    return record.window(0.0, seconds) if record.duration > seconds + 0.1 else record
 
 
 def fitted(model: Model, records: list[Record]) -> Model:
@@ -71,25 +71,24 @@ def mean_rms(model: Model, records: list[Record]) -> float:
 
 
 def study(data: Path, work: Work) -> list[Row]:
-    """Each joint; quickly the elbow alone, fitted to 15 s of two motions, what is known of it in place of a search."""
+    """Each joint; quickly the elbow alone, by 15 s of two motions."""
     folder = next(data.rglob(SOURCE.files)).parent.parent
     rows = []
     for joint, known in JOINTS.items():
         if not work.wanted(joint, QUICK):
             continue
-        fit = [motion(folder, name, joint) for name in FIT]
-        if work.quick:
-            fit = [record.window(0.0, QUICK_SECONDS) for record in fit[:2]]
+        used, seconds = (FIT[:2], QUICK_SECONDS) if work.quick else (FIT, SECONDS)
+        fit = [motion(folder, name, joint, seconds) for name in used]
         test = [motion(folder, name, joint) for name in TEST]
         bare = load_model(MODELS / "so101.yaml")
-        verdict, evidence, possible = "not searched", "the structure is given", [known] if known else []
+        words = ["--model", MODELS / "so101.yaml", "--record", *(folder / n / "control.csv" for n in used)]
+        words += ["--columns", f"so101_{joint}", "--window", 0, seconds]
         if not work.quick:
-            words = ["--model", MODELS / "so101.yaml", "--record", *(folder / n / "control.csv" for n in FIT)]
-            words += ["--columns", f"so101_{joint}", "--window", 0, SECONDS, "--segment", SEGMENT]
-            work.verb("compare", *words[:-2], into=f"{joint}_compared")
-            found = work.verb("diagnose", *words, "--within", 300, into=f"{joint}_diagnosed")
-            verdict, evidence = said(found)
-            possible = first_and_tied(found)
+            work.verb("compare", *words, into=f"{joint}_compared")
+        words += ["--segment", SEGMENT, "--within", 300, *(["--quick"] if work.quick else [])]
+        found = work.verb("diagnose", *words, into=f"{joint}_diagnosed")
+        verdict, evidence = said(found)
+        possible = first_and_tied(found)
         before = fitted(bare, fit)
         every = {name: fitted(bare.with_effect(name), fit) for name in possible}
         named = min(every, key=lambda name: mean_rms(every[name], fit), default=None)
@@ -100,8 +99,10 @@ def study(data: Path, work: Work) -> list[Row]:
         own = json.loads((MODELS / "so101_mujoco.json").read_text("utf-8"))[joint]
         theirs = 1e3 * float(np.mean([own["rmse"][f"test.{name}"] for name in TEST]))
         said_so = known in possible if known else not possible
-        checks = [Check(f"{joint}: {known or 'no load'} is named or nearest", said_so)] if not work.quick else []
-        checks.append(Check(f"{joint}: {mean['after']:.1f} ≤ 0.9 × {theirs:.1f} mrad", mean["after"] <= 0.9 * theirs))
+        checks = [
+            Check(f"{joint}: {known or 'no load'} is named or nearest", said_so),
+            Check(f"{joint}: {mean['after']:.1f} ≤ 0.9 × {theirs:.1f} mrad", mean["after"] <= 0.9 * theirs),
+        ]
         if known:
             checks.append(Check(f"{joint}: {mean['before']:.1f} falls to less than half, {mean['after']:.1f} mrad",
                                 mean["after"] < 0.5 * mean["before"]))  # fmt: skip

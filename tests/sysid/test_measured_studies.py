@@ -43,15 +43,16 @@ def test_what_a_study_says_of_its_excerpt_holds(studied: tuple[str, Path, int]) 
 
 
 def test_what_a_diagnosis_says_of_an_excerpt(studied: tuple[str, Path, int]) -> None:
-    """The goal of the servo moves on between samples that are 20 ms apart; the machine's loop has a dead time."""
+    """A servo's goal moves on between samples 20 ms apart; the loop of the machine has a dead time; an arm hangs."""
     name, out, _ = studied
     found = [json.loads(path.read_text("utf-8")) for path in out.glob("*/diagnose.json")]
-    if name == "so101":
-        assert not found, "a search takes minutes there"
-        return
     (found,) = found
     if name == "bam":
         assert [fault["name"] for fault in found["recording"]["faults"]] == ["drive_between_samples"]
+    elif name == "so101":
+        first = found["verdict"]["effects"][0]
+        tied = {c["name"] for c in found["competing_models"][first] if not c["distinguishable"]}
+        assert "gravity_pendulum" in {first} | tied
     else:
         assert {"spool_dynamics", "command_delay"} & {*found["verdict"]["effects"]}
     assert found["residual"]["after"]["validation"] < found["residual"]["before"]["validation"]
