@@ -191,6 +191,7 @@ class DataSheetFits(CandidateFits):
         most = (1.0 + WORSE_LOOK) * self.left_on_few(done) if near else 0.0
         for r in near:
             own = {p.name: r.refit.model.value(f"{r.name}.{p.name}") for p in r.refit.model.library[r.name].parameters}
+            self.say(f"{r.name} in the place of {' and '.join(d.key for d in taken)}")
             # Without the numbers the other values were bent to imitate them.
             unbent = restored(done.model, self.given, others).with_effect(r.name, own)
             looks = []
