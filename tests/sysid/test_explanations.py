@@ -20,6 +20,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.results import plain
 from hydraulic_sysid.diagnosis.search import Diagnosis, diagnose, verdict
+from hydraulic_sysid.diagnosis.search.data_sheet import relaxed
 from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import MOST_VALUES, QUICK_LEAST, QUICK_SECONDS, split
 from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError
@@ -239,6 +240,25 @@ def test_a_rival_that_was_stuck_begins_once_more_where_the_search_ended(model: M
     assert [r.name for r in again] == ["constant_load", "friction_asymmetry", "sensor_delay"]
     assert again[1].misfit.excess < 0.02 * base.misfit.excess
     assert again[2] is refits[1]  # it changes something else
+
+
+def test_rivals_that_a_loose_data_sheet_made_as_good_are_looked_for_as_it_was_filed(model: Model) -> None:
+    """Beside numbers that do what a load does, a droop that does nothing of it left as little as the load."""
+    loaded = model.with_effect("constant_load", {"load": 900.0})
+    search = Search.of(model, records(driven(loaded)), [], FitSettings(), lambda _: None)
+    base, final = search.begin(), search.state(loaded)
+    own, other = (
+        CandidateRefit(name, Refit(base.model.with_effect(name, values), base.linearisation.costs), final.misfit)
+        for name, values in (("constant_load", {"load": 900.0}), ("supply_droop", {"resistance": 1e8}))
+    )
+    loose = replace(base, model=relaxed(base.model), refits=[own, other])
+    misfits = {"constant_load": final.misfit}
+    for without, seen in ((loose, False), (replace(loose, model=model), True)):
+        found = SearchResult(model, search.split, search.settings, base, final, misfits, {"constant_load": without})
+        again = search.rivals_as_filed(found).competing["constant_load"]
+        assert (again is without) is seen
+        near = [r.name for r in again.refits if r.misfit.excess < 0.1 * base.misfit.excess]
+        assert ("supply_droop" in near) is seen
 
 
 def test_the_values_of_a_model_are_those_of_its_laws_as_they_stand(model: Model, runs) -> None:

@@ -24,6 +24,7 @@ from hydraulic_sysid.estimation.refinement import outlying
 from .candidate_fits import LATER_REFITS
 from .candidates import candidates
 from .competing_models import competing_models
+from .data_sheet import restored
 from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
@@ -60,6 +61,7 @@ MOST_EFFECTS = 6
 MOST_SWAPS = 3
 SAME = 0.9  # collinearity of a rival with an effect, from which it cannot leave far more, …
 MOST_STUCK = 2  # … and how many such are fitted anew
+APART = 0.5  # collinearity below which an effect and a rival cannot leave as little as each other by what they do
 
 
 class Search(RecordingFits):
@@ -92,7 +94,7 @@ class Search(RecordingFits):
         """
         try:
             searched = self.rivals_begun_anew(decisive(self.searched()))
-            concluded = self.concluded(searched, others=not self.quick)
+            concluded = self.rivals_as_filed(self.concluded(searched, others=not self.quick))
             concluded = self.set_against_effect(self.set_against_faults(concluded))
             found = accidents_named(self.by_force(concluded))
             if found.added and found.base.scores:  # not those beside the effects that were found last
@@ -126,6 +128,23 @@ class Search(RecordingFits):
                 refits = sorted(best.values(), key=lambda r: r.misfit.total)
                 competing[name] = replace(without, refits=refits)
         return replace(found, competing=competing)
+
+    def rivals_as_filed(self, found: SearchResult) -> SearchResult:
+        """With rivals that seem as good as an effect and change nothing alike looked for anew, the data sheet as it is.
+
+        While that was loose its numbers did what the effect does, and anything beside them left as little.
+        """
+        competing, base = dict(found.competing), found.base
+        for name, without in found.competing.items():
+            rivals = competing_models(name, without, found.final.misfit)
+            if self._strict(without) or not any(not c.distinguishable and c.collinearity < APART for c in rivals):
+                continue
+            bare = restored(found.final.model.without_effect(name), self.given, [d.key for d in found.moved])
+            with suppress(SimulationError):  # it does not run without the effect
+                again = self.explore(self.state(bare, self._last), most=LATER_REFITS)
+                competing[name] = again
+                base = replace(base, refits=again.refits, scores=again.scores) if len(found.added) == 1 else base
+        return replace(found, competing=competing, base=base)
 
     def _begun_at(self, bare: SearchState, candidate: CandidateScore) -> CandidateRefit:
         """A candidate fitted to the end, from where its score is best on this state."""
