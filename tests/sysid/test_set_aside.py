@@ -97,7 +97,7 @@ def test_a_rest_against_a_stop_counts_only_where_the_model_has_it(
 
 
 def test_a_servo_that_sticks_short_of_its_command_rests_against_no_stop() -> None:
-    """Its drive is where it is told to be: 5 mrad beyond where friction holds it, and far beyond a stop."""
+    """Its drive is where it is told to be: 70 mrad beyond where friction holds it, and 1.4 rad beyond a stop."""
     values = {"moving_mass": 0.1, "drive_force": 0.3, "drive_limit": 10.0, "stroke": 3.0}
     entries = {key: Entry(value) for key, value in values.items()}
     servo = Model("servo", entries, ("end_stop", "position_loop"), kind="mechanical")

@@ -51,8 +51,7 @@ def other_stops(model: Model, records: Sequence[Record], length: float) -> list[
     if "stroke" not in model.entries:
         return []
     plant = Plant(model)
-    stroke = model.value("stroke")
-    touch, opened = TOUCH * stroke, OPEN * stroke if plant.closes_a_loop else _open(plant)
+    touch, opened = TOUCH * model.value("stroke"), _open(plant)
     smooth = [_smoothed(r, length) for r in records]
     judged = [x[unjudged(r) :] for x, r in zip(smooth, records, strict=True)]
     ends = min(float(x.min()) for x in judged), max(float(x.max()) for x in judged)
@@ -95,7 +94,9 @@ def _towards(plant: Plant, record: Record) -> Array:
 
 
 def _open(plant: Plant) -> float:
-    """The drive [V] that moves a piston, unless a stop holds it: one without oil rests under less than its friction."""
+    """What moves a piston (`_towards`), unless a stop holds it: one without oil rests under less than its friction."""
+    if plant.closes_a_loop:
+        return OPEN * plant.value("stroke")
     opened = OPEN * plant.value("drive_limit")
     force = abs(plant.value("drive_force")) if plant.model.kind == "mechanical" else 0.0
     if not force:
