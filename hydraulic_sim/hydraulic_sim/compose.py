@@ -14,6 +14,7 @@ Layout of the arrays that the generated functions take:
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -156,10 +157,10 @@ class Writer:
                     lefts += [f"R[{index - n_rates}]", f"G[{index - n_rates}]"]
                 names.append(state.name)
             lines += [
-                f"if on[{self.layout.effects[effect.name]}]:",
-                f"    {', '.join(lefts)} = {self.call(effect, 'dynamics')}",
+                f"    if on[{self.layout.effects[effect.name]}]:",
+                f"        {', '.join(lefts)} = {self.call(effect, 'dynamics')}",
             ]
-        return "\n".join(lines) if lines else "pass"
+        return "\n".join(["if any_dynamics:", *lines]) if lines else "pass"
 
     def cut(self) -> str:
         """Where in a sample the command changes, and how many parts it has."""
@@ -175,11 +176,8 @@ class Writer:
 
     def switches(self) -> str:
         """One flag per stage, so that a stage without effects costs one test."""
-        lines = []
-        for name in slots.SLOTS:
-            indices = [self.layout.effects[e.name] for e in self.members(name)]
-            test = " or ".join(f"on[{i}] != 0" for i in indices) or "False"
-            lines.append(f"any_{name} = {test}")
+        lines = [f"any_{name} = {self._any_on(self.members(name))}" for name in slots.SLOTS]
+        lines.append(f"any_dynamics = {self._any_on(e for e in self.layout.library.values() if e.states)}")
         dry = [
             f"(on[{self.layout.effects[e.name]}] != 0 and ({self._acts(e)}))"
             for e in self.layout.library.values()
@@ -187,6 +185,19 @@ class Writer:
         ]
         lines.append("any_direction = " + (" or ".join(dry) or "False"))
         return "\n".join(lines)
+
+    def moving(self) -> str:
+        """How many rate states and relaxation states change: without effects that have any, those of the base."""
+        lines = []
+        for kind, name, every in (("rate", "rates_on", "NR"), ("relaxation", "relaxations_on", "NX - NR")):
+            own = sum(s.kind == kind for s in base.STATES)
+            having = [e for e in self.layout.library.values() if any(s.kind == kind for s in e.states)]
+            lines.append(f"{name} = {every} if {self._any_on(having)} else {own}")
+        return "\n".join(lines)
+
+    def _any_on(self, effects: Iterable[Effect]) -> str:
+        """The test that any of them is on."""
+        return " or ".join(f"on[{self.layout.effects[e.name]}] != 0" for e in effects) or "False"
 
     def _acts(self, effect: Effect) -> str:
         """The test that an effect is not at its null value."""
@@ -221,9 +232,10 @@ def places(layout: Layout) -> dict[str, object]:
         bristle_length=w.parameter("bristle_length"), bristle_time=w.parameter("bristle_time"),
     )  # fmt: skip
     return {
-        "stick": stick, "n_rates": layout.n_rates, "n_states": len(layout.states), "constants1": w.constants(),
-        "switches1": w.switches(), "rhs1": rhs, "rhs4": rhs, "bend": REVERSAL_BEND, "shorter": REVERSAL_STEP,
-        "most": MOST_SUBSTEPS, "command": shared["command"], "cut1": w.cut(),
+        "stick": stick, "n_rates": layout.n_rates, "n_states": len(layout.states), "n_outputs": len(base.OUTPUTS),
+        "constants1": w.constants(), "switches1": w.switches(), "moving1": w.moving(), "rhs1": rhs, "rhs4": rhs,
+        "bend": REVERSAL_BEND, "shorter": REVERSAL_STEP, "most": MOST_SUBSTEPS,
+        "command": shared["command"], "cut1": w.cut(),
         "position_sensor": shared["position_sensor"], "pressure_sensor": shared["pressure_sensor"],
         "position_sensor7": shared["position_sensor"], "pressure_sensor7": shared["pressure_sensor"],
     }  # fmt: skip

@@ -133,6 +133,7 @@ def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydrauli
     failure: time, substeps in the failing sample (0: not finite, else: too stiff for the step)."""
     {constants1}
     {switches1}
+    {moving1}
     S = np.empty(NX); K = np.zeros(NX); R = np.zeros(NX - NR); G = np.zeros(NX - NR)
     slope = np.empty(NR); rates = np.empty(NX - NR); goals = np.empty(NX - NR)
     {cut1}
@@ -165,9 +166,9 @@ def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydrauli
                             S[i] = X[i]
                     else:
                         span = h if stage == 3 else 0.5 * h
-                        for i in range(NR):
+                        for i in range(rates_on):
                             S[i] = X[i] + span * K[i]
-                        for i in range(NX - NR):
+                        for i in range(relaxations_on):
                             S[NR + i] = relax(X[NR + i], R[i], G[i], span)
                     now = start + k * dt + (dt - remaining) + span
                     {rhs4}
@@ -192,21 +193,21 @@ def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydrauli
                             Y[row, 0] = reading; Y[row, 1] = velocity; Y[row, 2] = reading_a; Y[row, 3] = reading_b
                             Y[row, 4] = pressure_supply; Y[row, 5] = spool; Y[row, 6] = position
                             Y[row, 7] = pressure_a; Y[row, 8] = pressure_b; Y[row, 9] = opening
-                        for i in range(NR):
+                        for i in range(rates_on):
                             slope[i] = K[i]
-                        for i in range(NX - NR):
+                        for i in range(relaxations_on):
                             rates[i] = R[i]; goals[i] = R[i] * G[i]
                     else:
                         weight = 1.0 if stage == 3 else 2.0
-                        for i in range(NR):
+                        for i in range(rates_on):
                             slope[i] += weight * K[i]
-                        for i in range(NX - NR):
+                        for i in range(relaxations_on):
                             rates[i] += weight * R[i]; goals[i] += weight * R[i] * G[i]
                 total = 0.0
-                for i in range(NR):
+                for i in range(rates_on):
                     X[i] += h / 6.0 * slope[i]
                     total += X[i]
-                for i in range(NX - NR):
+                for i in range(relaxations_on):
                     if rates[i] > 0.0:
                         X[NR + i] = relax(X[NR + i], rates[i] / 6.0, goals[i] / rates[i], h)
                 remaining = remaining - h if remaining - until - h > 1e-9 * dt else until
@@ -274,13 +275,16 @@ def bend(now, X, acceleration, command, on, P, hydraulic):
     X[{stick}] = S[{stick}]
 
 
-@njit("i8(f8[::1], f8, f8, f8, i8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[::1], u1[::1], f8[::1], u1, f8[:, :, ::1],"
-      " f8[::1])", cache=True, nogil=True, error_model="numpy")
-def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memories, turning, on, P, hydraulic, Y,
-             failure):
-    """Runs ``count`` samples from each start, the memories primed over ``past`` samples. Returns the starts done."""
+@njit("i8(f8[::1], f8, f8, f8, i8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[::1], u1[::1], f8[::1], u1, i8[::1],"
+      " f8[:, :, ::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
+def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memories, turning, on, P, hydraulic, wanted,
+             found, failure):
+    """Runs ``count`` samples from each start, the memories primed over ``past`` samples. Returns the starts done.
+
+    ``found`` takes the ``wanted`` columns of what is seen."""
     {constants1}
     X = np.empty(NX)
+    Y = np.empty((count, {n_outputs}))
     M = np.empty(memories.shape[1])
     for i in range(len(starts)):
         first = starts[i]
@@ -294,7 +298,11 @@ def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memorie
         if turning[i] == turning[i]:
             bend(first * dt, X, turning[i], clamp(drive[first] / drive_limit, -1.0, 1.0), on, P, hydraulic)
         ahead = drive[first:first + count]
-        done = run(ahead, dt, first * dt, max_step, max_turn, on, P, hydraulic, X, M, Y[i], failure)
+        done = run(ahead, dt, first * dt, max_step, max_turn, on, P, hydraulic, X, M, Y, failure)
+        own = found[i]
+        for k in range(count):
+            for j in range(len(wanted)):
+                own[k, j] = Y[k, wanted[j]]
         if done < count:
             return i
     return len(starts)
@@ -308,7 +316,7 @@ def track(drive, dt, max_step, max_turn, seen, every, starts, run_up, past, on, 
 
     What lies more than ``run_up`` samples before a start, and after the one before, is left out; memories of the drive
     are primed over ``past`` samples of that."""
-    Y = np.empty((1, 10))
+    Y = np.empty((1, {n_outputs}))
     k = 0
     for i in range(len(starts)):
         first = k + max(starts[i] - run_up - k, 0) // every * every

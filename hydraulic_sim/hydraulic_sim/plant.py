@@ -280,10 +280,26 @@ class Plant:
         turning: ArrayLike | None = None,
         shown: tuple[Array, float] | None = None,
     ) -> dict[str, Array]:
-        """Many short runs over one drive, each from a state of its own.
+        """What `predict_channels` says of all outputs, by their names: (S, horizon + 1), column 0 being the start."""
+        runs = self.predict_channels(base.OUTPUTS, drive, dt, starts, horizon, initial_states, memories, turning, shown)
+        return {name: runs[:, :, i] for i, name in enumerate(base.OUTPUTS)}
+
+    def predict_channels(
+        self,
+        channels: Sequence[str],
+        drive: ArrayLike,
+        dt: float,
+        starts: ArrayLike,
+        horizon: int,
+        initial_states: ArrayLike,
+        memories: Array | None = None,
+        turning: ArrayLike | None = None,
+        shown: tuple[Array, float] | None = None,
+    ) -> Array:
+        """Many short runs over one drive, each from a state of its own: what is seen of C ``channels``.
 
         ``starts`` (S,) sample indices into ``drive`` (N,); ``horizon`` samples ahead, ``starts + horizon`` < N;
-        ``initial_states`` (S, n_states). Returns channel → (S, horizon + 1), column 0 being the start itself.
+        ``initial_states`` (S, n_states). Returns (S, horizon + 1, C) of the outputs named, sample 0 being the start.
         Effects on the command remember the drive before each start, or begin with ``memories`` (S, n_memory) as
         `track` gives them. Where ``turning`` (S,) is an acceleration [m/s²], dry friction begins with what that asks
         for, as far as it can; NaN: with the state ``stick``. ``shown``: what the position's sensor showed at the starts
@@ -303,7 +319,8 @@ class Plant:
                 f"initial_states has the shape {states.shape}; expected {(len(first), len(self.layout.states))}"
             )
         self._check_dt(dt)
-        out = np.empty((len(first), horizon + 1, len(base.OUTPUTS)))
+        wanted = np.array([base.OUTPUTS.index(name) for name in channels], dtype=np.int64)
+        out = np.empty((len(first), horizon + 1, len(wanted)))
         failure = np.zeros(2)
         past = LONGEST_MEMORY if self._remembers and memories is None else 0
         if memories is None:
@@ -313,19 +330,21 @@ class Plant:
         asked = np.full(len(first), np.nan) if turning is None else np.require(turning, np.float64, ("C", "W"))
         done = self._compiled.run_many(
             u, dt, self.longest_step, self._turn, first, horizon + 1, past, states, memories, asked,
-            self._on, self._parameters, self._hydraulic, out, failure,
+            self._on, self._parameters, self._hydraulic, wanted, out, failure,
         )  # fmt: skip
         if done < len(first):
             start = int(first[done])
             into = min(max(int((failure[0] - start * dt) / dt + 1e-6), 0), horizon)
-            raise self._failed(failure, start + into, u, out[done, into], f"the run from sample {start} failed")
+            seen = _named(channels, out[done, into])
+            raise self._failed(failure, start + into, u, seen, f"the run from sample {start} failed")
         # One sum over all of it is four times as fast as a look at each reading, and as sure.
-        if not np.isfinite(out.sum()) and not np.isfinite(out[:, :, :_READINGS]).all():
-            i, k = np.argwhere(~np.isfinite(out[:, :, :_READINGS]).all(axis=2))[0]
-            raise SimulationError(
-                f"{self.model.name!r}: a sensor reads nothing finite at sample {first[i] + k}: {out[i, k, :_READINGS]}"
-            )
-        return {name: out[:, :, i] for i, name in enumerate(base.OUTPUTS)}
+        if not np.isfinite(out.sum()):
+            read = out[:, :, wanted < _READINGS]
+            for i, k in np.argwhere(~np.isfinite(read).all(axis=2)):
+                raise SimulationError(
+                    f"{self.model.name!r}: a sensor reads nothing finite at sample {first[i] + k}: {read[i, k]}"
+                )
+        return out
 
     def _with_shown(self, memories: Array, reading: Array, hidden: float) -> Array:
         """Memories (S, n_memory) in which those of the position's sensor begin with what it showed (S,)."""
@@ -473,7 +492,8 @@ class Plant:
             failure,
         )  # fmt: skip
         if done < len(u):
-            raise self._failed(failure, done, u, out[done], f"state reached: {_named(self.layout.states, x)}")
+            seen, where = _named(base.OUTPUTS, out[done]), _named(self.layout.states, x)
+            raise self._failed(failure, done, u, seen, f"state reached: {where}")
 
     def embedded(self) -> Embedded:
         """What compiled code of others needs to run this plant; the arrays are its own and not to be written to."""
@@ -482,7 +502,7 @@ class Plant:
             len(base.OUTPUTS),
         )  # fmt: skip
 
-    def _failed(self, failure: Array, sample: int, u: Array, outputs: Array, more: str) -> SimulationError:
+    def _failed(self, failure: Array, sample: int, u: Array, outputs: str, more: str) -> SimulationError:
         why = (
             "a state is no longer finite"
             if failure[1] == 0.0
@@ -490,7 +510,7 @@ class Plant:
         )
         return SimulationError(
             f"{why} at t = {failure[0]:.6g} s (sample {sample}); drive {u[sample]:.6g} V, "
-            f"before it {u[max(sample - 1, 0)]:.6g} V; at the sample: {_named(base.OUTPUTS, outputs)}; {more}"
+            f"before it {u[max(sample - 1, 0)]:.6g} V; at the sample: {outputs}; {more}"
         )
 
     def derivative(self, state: Array, drive: float, time: float = 0.0) -> tuple[Array, dict[str, float]]:

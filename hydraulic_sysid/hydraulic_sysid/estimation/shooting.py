@@ -226,12 +226,11 @@ class Shooting:
         beside, shown = self._beside(plant, i), segments.shown if plant.begins_shown else None
 
         def seen(plant: Plant, own: Mask | slice) -> Array:
-            run = plant.predict(
-                drive, segments.record.dt, segments.first[own], segments.samples - 1, states[own],
+            return plant.predict_channels(
+                segments.channels, drive, segments.record.dt, segments.first[own], segments.samples - 1, states[own],
                 None if memories is None else memories[own], self._turning[i][own],
                 None if shown is None else (shown[0][own], shown[1]),
             )  # fmt: skip
-            return np.stack([run[c] for c in segments.channels], axis=-1)
 
         free, clear = beside.clear_of_stops(), self._clear[i]
         if free is beside or not clear.any():
