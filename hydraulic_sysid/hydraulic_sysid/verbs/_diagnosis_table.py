@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from rich.console import Console
@@ -30,5 +31,8 @@ def show(result: dict[str, Any], console: Console) -> None:
 
 def _value(parameter: dict[str, Any]) -> str:
     error, unit = parameter["standard_error"], parameter["unit"]
-    spread = f" ± {error:.2g}" if error is not None and error < float("inf") else ""
+    low, high = parameter["interval"] or (-math.inf, math.inf)
+    spread = f" ± {error:.2g}" if error is not None and error < math.inf else ""
+    if parameter["at_bound"] and math.isfinite(high - low):
+        spread = f" ({low:.3g} … {high:.3g})"
     return f"{parameter['key'].split('.')[1]} {parameter['value']:.4g}{spread}{'' if unit == '1' else ' ' + unit}"

@@ -10,14 +10,13 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.fit import FitSettings
 
-from .data_sheet import as_filed, tolerances
+from .data_sheet import as_filed
 from .diagnosis import finished
 from .document import added_document
 from .errors import DiagnosisError
 from .misfit import material
 from .progress import Watch
 from .search import Search
-from .uncertainty import parameter_errors
 
 
 @dataclass(frozen=True)
@@ -50,5 +49,5 @@ def add(
     search = Search.of(model, records, validation, settings or FitSettings(), say, watch=watch)
     found = search.with_final_values(search.add(effect))
     confirmed = found.by_force is not None or material(found.base.misfit, found.final.misfit)
-    known = parameter_errors(found.final.linearisation, tolerances(found.model))
+    known = search.known_of(found, found.named)
     return Addition(as_filed(finished(found, known), model), confirmed, added_document(found, known, confirmed))

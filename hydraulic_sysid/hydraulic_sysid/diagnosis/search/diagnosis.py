@@ -18,7 +18,7 @@ from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locat
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
-from .data_sheet import as_filed, tolerances
+from .data_sheet import as_filed
 from .document import document, with_balances
 from .linearisation import Linearisation
 from .misfit import explained
@@ -26,7 +26,7 @@ from .nonparametric_curves import NonparametricCurve, nonparametric_curves
 from .progress import Watch
 from .search import Search
 from .search_state import SearchResult
-from .uncertainty import Known, parameter_errors
+from .uncertainty import Known
 from .worth import HOPELESS
 
 BALANCED = 40.0  # s of all records together of which balances are formed where they are not attributed, …
@@ -120,7 +120,7 @@ def diagnose(
         remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
         if not outside:  # else nothing says of any model that it is right
             found = search.with_final_values(found)
-        known = parameter_errors(found.final.linearisation, tolerances(found.model))
+        known = search.known_of(found, () if outside else found.named)
         whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
         whole["settings"] = {**whole["settings"], "quick": quick}
         if quick:

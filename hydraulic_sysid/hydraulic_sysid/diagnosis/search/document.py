@@ -251,7 +251,7 @@ def _parameters(model: Model, known: Mapping[str, Known], keys: Sequence[str]) -
                 "value": value,
                 "unit": model.parameter(key).unit,
                 "standard_error": None if k is None else k.standard_error,
-                "interval": None if k is None else [value - k.half_width, value + k.half_width],
+                "interval": None if k is None else list(k.interval(value)),
                 "bounds": list(model.entry(key).bounds or ()),
                 "at_bound": None if k is None else k.at_bound,
             }

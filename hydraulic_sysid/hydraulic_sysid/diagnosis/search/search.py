@@ -8,10 +8,11 @@ it builds on stands in layers: `fitting`, `candidate_fits`, `data_sheet_fits`, `
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from hydraulic_sysid.estimation.refinement import outlying
 from .candidate_fits import LATER_REFITS
 from .candidates import candidates
 from .competing_models import competing_models
-from .data_sheet import restored
+from .data_sheet import restored, tolerances
 from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
@@ -35,12 +36,14 @@ from .frozen_jacobian import Refit
 from .linearisation import Linearisation
 from .misfit import SMALL, Misfit, explained, material
 from .nonparametric_curves import NonparametricCurve, nonparametric_curves
+from .profile_likelihood import with_profiles
 from .progress import OutOfTimeError
 from .recording_fits import RIVAL, RecordingFits
 from .score_test import CandidateScore, score
 from .search_state import CandidateRefit, SearchResult, SearchState
 from .set_aside import accidents
 from .spectral_lines import record_features
+from .uncertainty import Known, parameter_errors
 from .worth import (
     AS_GOOD,
     FURTHER,
@@ -195,6 +198,36 @@ class Search(RecordingFits):
         model = self.with_exact_laws(found.final.model, found.split)
         moved = tuple(replace(d, value=model.value(d.key)) for d in found.moved)
         return replace(found, final=replace(found.final, model=model), moved=moved)
+
+    def known_of(self, found: SearchResult, named: Collection[str]) -> dict[str, Known]:
+        """How well the parameters of the final model are known; those that are ``named`` by what they cost elsewhere.
+
+        A quick search leaves these fits out.
+        """
+        at, sheet = found.final.linearisation, tolerances(found.model)
+        known = parameter_errors(at, sheet)
+        fitted = partial(self.held, at)
+        least = cache(lambda: fitted(None))
+
+        def cost(key: str, value: float) -> float:
+            self.say(f"the interval of {key}")
+            return fitted((key, value)) - least()
+
+        return with_profiles(at, known, () if self.quick or found.stopped else named, cost, sheet)
+
+    def held(self, at: Linearisation, number: tuple[str, float] | None) -> float:
+        """What is left of the segments for fitting, a parameter held at a value [SI], all others fitted anew.
+
+        Infinite where it does not run.
+        """
+        model, prior = at.model, 0.0
+        if number is not None:
+            key, value = number
+            mean, std = self.priors.get(key, (value, 1.0))
+            model, prior = model.with_entry(key, value=value, free=False), ((value - mean) / std) ** 2
+        with suppress(SimulationError):
+            return self.fitted_to(at.split.to_fit, model, self._last).point.cost + prior
+        return math.inf
 
     def so_far(self) -> SearchResult:
         """The best so far: effects added, and the best of those that were tried next, fitted."""

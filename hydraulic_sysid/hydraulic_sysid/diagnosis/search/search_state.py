@@ -143,6 +143,13 @@ class SearchResult:
         """Effects, the one that explains most first."""
         return list(self.misfits)
 
+    @property
+    def named(self) -> list[str]:
+        """Keys of what is said to be there: parameters of the effects added, numbers of the data sheet."""
+        library = self.final.model.library
+        own = [f"{name}.{p.name}" for name in self.added for p in library[name].parameters]
+        return [*own, *(d.key for d in self.moved)]
+
     @cached_property
     def remainders(self) -> list[Remainder]:
         """What is left in the end, in the units of the sensors."""

@@ -43,11 +43,20 @@ EXACT: Mapping[str, float] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Known:
-    """Standard error and half width of the 95 % interval [SI]; infinite where the data do not determine it."""
+    """Standard error and half width of the 95 % interval [SI]; infinite where the data do not determine it.
+
+    ``profile``: the ends of the interval where that is not so wide to both sides (`profile_likelihood`).
+    """
 
     standard_error: float
     half_width: float
     at_bound: str | None
+    profile: tuple[float, float] | None = None
+
+    def interval(self, value: float) -> tuple[float, float]:
+        """The 95 % interval of a parameter with this value [SI]."""
+        low, high = self.profile or (value - self.half_width, value + self.half_width)
+        return min(low, value), max(high, value)
 
 
 def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT) -> dict[str, Known]:
@@ -59,17 +68,12 @@ def parameter_errors(at: Linearisation, tolerances: Mapping[str, float] = EXACT)
     free = np.flatnonzero([k not in at_bound for k in parameters.keys])
     errors, widths = np.full((2, len(parameters)), np.inf)
     if free.size:
-        normal = at.normal.subset(free)
-        bread = inverse(normal.information)
-        own, half = _errors(bread, normal.scores)
-        sheet = _of_held(at, free, bread, tolerances)
-        errors[free] = np.hypot(own, sheet)
-        widths[free] = np.hypot(half, norm.ppf(0.5 + 0.5 * _COVERED) * sheet)
+        errors[free], widths[free] = errors_beside(at, free, tolerances)
     found = {}
     for key, error, width, value, scale in zip(
         parameters.keys, errors.tolist(), widths.tolist(), parameters.values.tolist(), parameters.scales, strict=True
     ):
-        law = _share(at.model, key) * abs(value)
+        law = law_share(at.model, key) * abs(value)
         known = error < 1e3
         found[key] = Known(
             math.hypot(error * scale, law) if known else math.inf,
@@ -93,7 +97,19 @@ def may_be_nothing(at: Linearisation, effect: Effect) -> bool:
     )
 
 
-def _share(model: Model, key: str) -> float:
+def errors_beside(at: Linearisation, free: Index, tolerances: Mapping[str, float]) -> tuple[Array, Array]:
+    """Standard errors (F,) and half widths (F,) of 95 % of the parameters ``free``, the others held, of their scales.
+
+    What their laws may be off is not in them.
+    """
+    normal = at.normal.subset(free)
+    bread = inverse(normal.information)
+    own, half = _errors(bread, normal.scores)
+    sheet = _of_held(at, free, bread, tolerances)
+    return np.hypot(own, sheet), np.hypot(half, norm.ppf(0.5 + 0.5 * _COVERED) * sheet)
+
+
+def law_share(model: Model, key: str) -> float:
     """Standard error of a parameter for the law that it stands in, of its value; gauges and drawings tell of no law."""
     record = model.parameter(key)
     if "." not in key:
