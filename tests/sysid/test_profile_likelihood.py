@@ -89,7 +89,16 @@ def test_of_a_parameter_that_is_well_known_it_is_that_of_a_normal_distribution(b
     vague = {**known, key: replace(known[key], standard_error=math.inf)}
     low, high = with_profiles(at, vague, [key], costs(at))[key].interval(at.model.value(key))
     np.testing.assert_allclose([low, high], known[key].interval(at.model.value(key)), rtol=0.01)
-    assert with_profiles(at, known, [key], costs(at)) == known  # and not sought
+    assert with_profiles(at, known, [key], costs(at))[key] == known[key]  # and not sought
+
+
+def test_no_interval_goes_where_no_fit_may(bench: Model) -> None:
+    at = fitted(bench, FREE)
+    key, (low, high) = LEAKAGE, bench.parameter(LEAKAGE).bounds
+    unknown = replace(parameter_errors(at)[key], standard_error=math.inf, half_width=math.inf)
+    none = {**parameter_errors(at), key: unknown}
+    found = with_profiles(at, none, (), costs(at), {})[key].interval(at.model.value(key))
+    assert low <= found[0] < at.model.value(key) < found[1] <= high
 
 
 def test_a_parameter_that_is_hardly_known_may_be_further_off_one_way(bench: Model) -> None:

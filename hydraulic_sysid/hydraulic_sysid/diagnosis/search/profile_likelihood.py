@@ -63,8 +63,7 @@ def with_profiles(
     found = dict(known)
     for key, value in at.parameters.by_key.items():
         own = known[key]
-        vague = not own.standard_error < VAGUE * abs(value)
-        if own.at_bound is not None or (vague and key in named):
+        if own.at_bound is not None or not own.standard_error < VAGUE * abs(value):
             found[key] = replace(own, profile=_interval(at, key, cost if key in named else None, tolerances))
     return found
 
