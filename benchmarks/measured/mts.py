@@ -141,7 +141,7 @@ def damper(data: Path, work: Work) -> Row:
     work.picture("mr_damper", [(f"{name}, a test record", r.time, {k: own[k] for k in shown})
                                for name, r, own in zip(DAMPER_TEST, tests, loops, strict=True)], "N")  # fmt: skip
     before, turned, after = off.values()
-    left = {which: joined["residual"][which]["validation"] for which in ("before", "after")}
+    left = {which: joined["test"][which] for which in ("before", "after")}
     lag = values["proposed law"].get("hysteresis.lag", 0.0)
     return Row(
         "MR damper at 1 A", f"{kind}: nearest {', '.join(nearest)}", evidence,

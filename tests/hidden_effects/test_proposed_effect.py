@@ -67,8 +67,8 @@ def test_what_no_library_knows_is_proposed_joined_and_explains_the_records(bench
     assert "never overwritten" in capsys.readouterr().err
 
     assert add([str(effect), *command, "--holdout", unseen, "--out", str(bench / "joined")]) == 0
-    fall = document(bench / "joined", "add")["residual"]
-    assert fall["before"]["validation"] > 1.1 and fall["after"]["validation"] < 1.02, fall
+    fall = document(bench / "joined", "add")["test"]
+    assert fall["before"] > 1.1 and fall["after"] < 1.02, fall
     joined = load_model(bench / "joined" / "model.yaml")
     assert joined.user_effects == ((bench / "joined" / "worn_barrel.py").resolve(),)
     assert "worn_barrel" in joined.effects and joined.history[-1]["change"] == "added worn_barrel"

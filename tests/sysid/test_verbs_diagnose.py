@@ -277,7 +277,9 @@ def test_add_fits_an_effect_and_says_whether_the_data_bear_it_out(
     assert add_main(["valve_deadband", *command, "--out", str(tmp_path / "right")]) == 0
     done = json.loads(capsys.readouterr().out)
     assert done["verdict"]["kind"] == "confirmed" and "probability" not in done["verdict"]
-    assert [r["name"] for r in done["records"] if r["role"] == "validation"]
+    assert [r["name"] for r in done["records"] if r["role"] == "test"] == done["test"]["records"]
+    assert done["test"]["after"] < 1.05 < 1.5 < done["test"]["before"]
+    assert "On unseen data" in done["verdict"]["text"]
     assert_cannot_inject(json.loads((tmp_path / "right" / "add.json").read_text()))
     assert done["residual"]["after"]["validation"] < 1.05 < 1.5 < done["residual"]["before"]["validation"]
     assert "valve_deadband" in load_model(tmp_path / "right" / "model.yaml").effects

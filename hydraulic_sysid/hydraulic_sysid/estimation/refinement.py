@@ -17,6 +17,7 @@ from . import noise_model
 from .covariance import inverse
 from .fit import FitPoint
 from .noise_model import ChannelNoise
+from .parameters import Parameters
 from .segments import Segments
 
 LATE = 0.35  # sampling intervals by which a channel may be late without being named
@@ -59,21 +60,39 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
         for (i, c), own in zip(where, strength, strict=True):
             loud[i][near[i], c] = own
         noise[channel] = noise_model.estimate([q / own[:, None] for q, own in zip(quiet, strength, strict=True)], dt)
-    parameters = point.parameters
-    own = np.array([k in laws for k in parameters.keys], dtype=bool)
-    shares = np.where(own, parameters.values / parameters.scales * LAW, 0.0)
     found = []
     for i, s in enumerate(segments):
         readings = tuple(replace(t, delay=late.get(c, t.delay)) for c, t in zip(s.channels, s.readings, strict=True))
         judged = replace(
             s, loudness=loud[i], outliers=spikes[i], readings=readings, hum=tuple(lines[c] for c in s.channels)
         )
-        off = _raw_columns(s, columns[i], shares)
-        hum = _hum(s, [lines[c] for c in s.channels], [noise[c].std for c in s.channels])
-        judged = judged.with_noise([noise[c] for c in s.channels])
-        raw = np.concatenate((off, hum, s.disturbance), axis=-1)  # in this order: `Segments.with_exact_laws`
-        found.append(replace(judged, nuisance=judged.whitened(raw)))
+        off = _raw_columns(s, columns[i], _shares(point.parameters, laws))
+        found.append(_with_nuisance(judged.with_noise([noise[c] for c in s.channels]), off))
     return found
+
+
+def with_nuisance(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) -> list[Segments]:
+    """The point's segments as they are known to be recorded, every law off a little as in `refined`."""
+    shares, every = _shares(point.parameters, laws), zip(point.shooting.segments, columns, strict=True)
+    return [_with_nuisance(s, _raw_columns(s, own, shares)) for s, own in every]
+
+
+def with_hum(segments: Segments) -> Segments:
+    """Segments in which nothing but the mains lines that are known of them may be."""
+    return _with_nuisance(segments, np.zeros((*segments.measured.shape, 0)))
+
+
+def _with_nuisance(segments: Segments, off: Array) -> Segments:
+    """Segments in which laws may be ``off`` (S, samples, C, K) [SI] besides what the recording adds."""
+    hum = _hum(segments, segments.hum, [n.std for n in segments.noise])
+    raw = np.concatenate((off, hum, segments.disturbance), axis=-1)  # in this order: `Segments.with_exact_laws`
+    return replace(segments, nuisance=segments.whitened(raw))
+
+
+def _shares(parameters: Parameters, laws: Collection[str]) -> Array:
+    """(P,) by how many of its scales each of the ``laws`` may be off in a segment, 0 for all other parameters."""
+    own = np.array([k in laws for k in parameters.keys], dtype=bool)
+    return np.where(own, parameters.values / parameters.scales * LAW, 0.0)
 
 
 def ordinary(point: FitPoint, found: Sequence[Segments]) -> list[Mask]:

@@ -187,7 +187,7 @@ class Segments:
             for row, basis in self._missing[c]:
                 white[row] -= np.tensordot(basis, np.tensordot(basis, white[row], axes=(0, 0)), axes=(1, 0))
             found.append(white / self.loudness[:, c].reshape((-1,) + (1,) * (white.ndim - 1)))
-        return np.stack(found, axis=2).reshape(len(values), -1, *values.shape[3:])
+        return np.stack(found, axis=2).reshape(len(values), values.shape[1] * len(self.noise), *values.shape[3:])
 
     @cached_property
     def starts_of_filters(self) -> Array:

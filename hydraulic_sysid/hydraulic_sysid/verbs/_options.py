@@ -168,7 +168,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
 
     What the page suggests next is to read the same. Nothing where a verb or its call names none.
     """
-    paths = {name: getattr(options, name, None) for name in ("record", "holdout")}
+    paths = {name: getattr(options, name, None) for name in ("record", "validation", "holdout")}
     # Some verbs hold out a part of every record, and no files.
     files = {name: [str(path) for path in given] for name, given in paths.items() if isinstance(given, list) and given}
     others = {name: getattr(options, name, None) for name in ("columns", "window", "segment")}
@@ -205,15 +205,24 @@ def add_period_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_diagnosis_options(parser: argparse.ArgumentParser) -> None:
-    """Model, records, records for validation, length of a segment."""
+    """Model, records, records for validation and for a test, length of a segment."""
     add_model_option(parser)
     add_record_options(parser)
+    parser.add_argument(
+        "--validation",
+        metavar="PATH",
+        type=Path,
+        nargs="+",
+        help="records for validation: no fit sees them, but they decide what is added (default: every third block of "
+        "every record)",
+    )
     parser.add_argument(
         "--holdout",
         metavar="PATH",
         type=Path,
         nargs="+",
-        help="records for validation (default: every third block of every record)",
+        help="test data: records that neither a fit nor the choice of what is added sees (default: what is left of "
+        "long records)",
     )
     add_segment_option(parser)
 

@@ -48,9 +48,9 @@ def _add(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     if file is not None:
         model = model.with_effect_file(file)
     records = opt.read_records(options)
-    validation = opt.read_kept_back(options.holdout, options)
+    validation, test = (opt.read_kept_back(paths, options) for paths in (options.validation, options.holdout))
     effect = options.effect if file is None else file.stem
-    done = add(model, effect, records, validation, FitSettings(length=options.segment), say, opt.watch(options))
+    done = add(model, effect, records, validation, FitSettings(length=options.segment), say, opt.watch(options), test)
     files: dict[str, Callable[[Path], object]] = {}
     if file is not None and copied:
         files[file.name] = partial(shutil.copyfile, file)

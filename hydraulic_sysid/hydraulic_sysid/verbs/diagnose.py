@@ -69,10 +69,10 @@ def _diagnose(options: argparse.Namespace, say: opt.Say) -> opt.Done:
     if options.propose:
         _check_name(options.propose, model)
     records = opt.read_records(options)
-    validation = opt.read_kept_back(options.holdout, options)
+    validation, test = (opt.read_kept_back(paths, options) for paths in (options.validation, options.holdout))
     done = diagnose(
         model, records, validation, FitSettings(length=options.segment), say, options.within, opt.watch(options),
-        options.quick,
+        options.quick, test,
     )  # fmt: skip
     kind = done.result["verdict"]["kind"]
     models = {f"competing_{name}.yaml": model for name, model in done.competing.items()}

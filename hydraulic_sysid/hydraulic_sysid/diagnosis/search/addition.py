@@ -36,8 +36,9 @@ def add(
     settings: FitSettings | None = None,
     progress: Callable[[str], None] | None = None,
     watch: Watch | None = None,
+    test: Sequence[Record] = (),
 ) -> Addition:
-    """Switch ``effect`` on, fit it with all that is free, and say what it does to the error on validation data.
+    """Switch ``effect`` on, fit it with all that is free, and say what it does to the error on data that no fit saw.
 
     :raises DiagnosisError: no records or unusable ones, or the effect is on already.
     :raises hydraulic_sim.errors.ModelError: an unknown effect, or one that excludes another that is on.
@@ -46,8 +47,9 @@ def add(
         raise DiagnosisError(f"{effect} is on already; calibrate fits its parameters")
     model.with_effect(effect).check_complete()
     say = progress or (lambda _: None)
-    search = Search.of(model, records, validation, settings or FitSettings(), say, watch=watch)
+    search = Search.of(model, records, validation, settings or FitSettings(), say, watch=watch, test=test)
     found = search.with_final_values(search.add(effect))
     confirmed = found.by_force is not None or material(found.base.misfit, found.final.misfit)
     known = search.known_of(found, found.named)
-    return Addition(as_filed(finished(found, known), model), confirmed, added_document(found, known, confirmed))
+    result = added_document(found, known, confirmed, search.tested(found))
+    return Addition(as_filed(finished(found, known), model), confirmed, result)

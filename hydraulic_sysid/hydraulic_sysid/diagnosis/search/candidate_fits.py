@@ -12,7 +12,7 @@ from hydraulic_sysid.estimation.parallel import results
 
 from .candidate_table import candidate_table
 from .candidates import candidates, delays, observed, subsystem
-from .fitting import ENOUGH, FAR_OFF, Fitting, Task, with_fitted_values, without_derivative
+from .fitting import ENOUGH, FAR_OFF, Fitting, Task, differentiable, with_fitted_values, without_derivative
 from .frozen_jacobian import Refit, refit, refit_rounded
 from .linearisation import Linearisation
 from .misfit import misfit
@@ -213,7 +213,7 @@ class CandidateFits(Fitting):
         """The best candidates on the model as its file has it, not refitted yet."""
         filed = self.with_filed_values(base.model)
         try:
-            at = Linearisation.of(self._smooth(filed), self.split, self.priors)
+            at = Linearisation.of(differentiable(filed), self.split, self.priors)
         except SimulationError:  # what was added beside it does not run with them
             return []
         scores = [s for s in score(at, candidates(filed), record_features(at)) if not observed(s.effect)]

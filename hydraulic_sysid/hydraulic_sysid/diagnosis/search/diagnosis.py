@@ -84,6 +84,7 @@ def diagnose(
     within: float | None = None,
     watch: Watch | None = None,
     quick: bool = False,
+    test: Sequence[Record] = (),
 ) -> Diagnosis:
     """Find the library effects that ``model`` lacks to explain ``records``.
 
@@ -99,7 +100,7 @@ def diagnose(
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
     """
     say = progress or (lambda _: None)
-    search = Search.of(model, records, validation, settings or FitSettings(), say, within, watch, quick)
+    search = Search.of(model, records, validation, settings or FitSettings(), say, within, watch, quick, test)
     say("the records against the model file")
     checked = contradictions(model, [*records, *validation])
     found = verdicts.conclusive(search.run())
@@ -121,7 +122,7 @@ def diagnose(
         if not outside:  # else nothing says of any model that it is right
             found = search.with_final_values(found)
         known = search.known_of(found, () if outside else found.named)
-        whole = {**document(found, verdict, known, curves), "check": check_rows(checked)}
+        whole = {**document(found, verdict, known, curves, search.tested(found)), "check": check_rows(checked)}
         whole["settings"] = {**whole["settings"], "quick": quick}
         if quick:
             whole["verdict"]["text"] += f" {HASTE}"

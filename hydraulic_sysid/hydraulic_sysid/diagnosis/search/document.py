@@ -20,6 +20,7 @@ from .nonparametric_curves import NonparametricCurve
 from .recording_faults import RecordingFault
 from .search_state import SearchResult
 from .uncertainty import Known
+from .unseen import TriedOut
 from .verdict import MISSING, OUTSIDE, UNDECIDED, Verdict
 from .worst_segments import worst_segments
 
@@ -28,16 +29,22 @@ MOST_PLACES = 50  # of spikes in a channel that are listed
 
 
 def document(
-    result: SearchResult, verdict: Verdict, known: Mapping[str, Known], curves: Sequence[NonparametricCurve]
+    result: SearchResult,
+    verdict: Verdict,
+    known: Mapping[str, Known],
+    curves: Sequence[NonparametricCurve],
+    tested: TriedOut | None = None,
 ) -> dict[str, Any]:
-    """The document, still without balances (`with_balances`); arrays NumPy, SI."""
+    """The document, still without balances (`with_balances`); arrays NumPy, SI. ``tested``: on test data, if at all."""
     final = result.final
     records = {role: result.split.records(role == "validation") for role in ("fit", "validation")}
+    records["test"] = result.split.tested()
     imitations = verdicts.imitated([r for every in records.values() for r in every])
     outside = verdict.kind == OUTSIDE
     explained = final.misfit.variance <= 1.0 + 2.0 * UNSEEN
     compared = posterior.explanations(result, verdict)
-    text = f"{verdicts.sentences(result, verdict, curves)} {posterior.sentence(compared)}".strip()
+    said = [verdicts.sentences(result, verdict, curves), "" if tested is None else tested.text]
+    text = " ".join(filter(None, [*said, posterior.sentence(compared)]))
     return {
         **heading("diagnose", 2),
         "model": model_document(result.model),
@@ -81,6 +88,7 @@ def document(
             "after": _residual(final.misfit),
             "after_each_effect": [{"name": name, **_residual(after)} for name, after in result.misfits.items()],
         },
+        "test": None if tested is None or not tested.records else vars(tested),
         "effects": _effects(result, verdict, known),
         "competing_models": {
             name: [
@@ -146,17 +154,22 @@ def _fault(found: RecordingFault) -> dict[str, Any]:
     }
 
 
-def added_document(result: SearchResult, known: Mapping[str, Known], confirmed: bool) -> dict[str, Any]:
+def added_document(
+    result: SearchResult, known: Mapping[str, Known], confirmed: bool, tested: TriedOut | None = None
+) -> dict[str, Any]:
     """The document of one effect added on request: the same keys, as far as they apply."""
     (name,) = result.added
-    whole = document(result, Verdict(MISSING, [name], {}, {}), known, ())
+    whole = document(result, Verdict(MISSING, [name], {}, {}), known, (), tested)
     before, after = (number["validation"] for number in (whole["residual"]["before"], whole["residual"]["after"]))
     text = f"With {name} the residual on validation data goes from {before:.4g} to {after:.4g} × noise"
     whole |= heading("add", 2)
     whole["verdict"] |= {
         "kind": "confirmed" if confirmed else "not confirmed",
         "level": whole["verdict"]["level"] if confirmed else "off",
-        "text": " ".join([text + ("." if confirmed else REFUTED), *verdicts.force_sentences(result, others=False)]),
+        "text": " ".join([
+            text + ("." if confirmed else REFUTED), *([tested.text] if tested is not None and tested.text else []),
+            *verdicts.force_sentences(result, others=False),
+        ]),
     }
     del whole["verdict"]["probability"]
     unused = ("explanations", "competing_models", "nonparametric_curves", "nearest_effects", "proposed_effect",

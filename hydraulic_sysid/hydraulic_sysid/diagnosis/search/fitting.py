@@ -85,12 +85,14 @@ class Fitting:
     def of(
         cls: type[F], model: Model, records: Sequence[Record], validation: Sequence[Record], settings: FitSettings,
         say: Say, within: float | None = None, watch: Watch | None = None, quick: bool = False,
+        test: Sequence[Record] = (),
     ) -> F:  # fmt: skip
         """Cut the records; free parameters without bounds get those of a data sheet.
 
         :param within: seconds after which the search ends with the best so far
         :param watch: takes what is found meanwhile
         :param quick: fewer values, spread over all records, and nothing that only confirms
+        :param test: records to test on; by default what is left of long ones
         :raises DiagnosisError: there are no records, or one cannot be cut.
         """
         if not records:
@@ -98,7 +100,7 @@ class Fitting:
         model = bounded(model)
         length = settings.seconds(model, [*records, *validation])
         try:
-            cuts = split(records, validation, model, length, quick)
+            cuts = split(records, validation, model, length, quick, test)
             quarter = shorter(length, SHORTER, [*records, *validation])
             short = partial(split, records, validation, model, quarter, quick)
             progress = Progress(say, within, watch or (lambda _: None))
@@ -108,7 +110,7 @@ class Fitting:
 
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
-        smooth = self._smooth(model)
+        smooth = differentiable(model)
         segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
         done = self.fitted_to(segments, smooth, settings or self.settings)
         starts = KnownStarts(self.starts(smooth))
@@ -131,7 +133,7 @@ class Fitting:
 
     def fitted_to(self, segments: Sequence[Segments], model: Model, settings: FitSettings) -> Fit:
         """A model, without effects that have no derivative, fitted to these segments."""
-        smooth = self._smooth(model)
+        smooth = differentiable(model)
         return fit_segments(
             Plant.for_fits(smooth), segments, smooth.movable_keys(), settings,
             progress=lambda *_: self.say.left(), priors=self.priors, starts=self.starts(smooth),
@@ -144,7 +146,7 @@ class Fitting:
         the model is used for afterwards has one value for all. One that is ``competing`` may have numbers of the data
         sheet free that say the same, along which a fit goes on for ever: it goes no further than those before.
         """
-        smooth, settings = self._smooth(model), self._last if competing else self.settings
+        smooth, settings = differentiable(model), self._last if competing else self.settings
         try:
             done = self.fitted_to([s.with_exact_laws() for s in split.to_fit], smooth, settings)
         except SimulationError:  # it does not run from where the records show the initial states
@@ -228,7 +230,7 @@ class Fitting:
         """
         if not keys:
             return model
-        smooth, short = self._smooth(model), self.short().some(ENOUGH)
+        smooth, short = differentiable(model), self.short().some(ENOUGH)
         for key in keys:
             now = smooth.value(key)
             low, high = smooth.entry(key).bounds or (now, now)
@@ -283,7 +285,7 @@ class Fitting:
 
     def left_on_few(self, state: SearchState) -> float:
         """What a state leaves of the same segments."""
-        model = self._smooth(state.model)
+        model = differentiable(state.model)
         few = self.split.some(LOOK)
         keys = model.movable_keys()
         starts = self.starts(model)
@@ -299,12 +301,6 @@ class Fitting:
         return all(
             (at(k).free, at(k).bounds) == (given(k).free, given(k).bounds) for k in self.given.keys() if "." not in k  # noqa: SIM118
         )  # fmt: skip
-
-    def _smooth(self, model: Model) -> Model:
-        """Without effects that have no derivative."""
-        for name in without_derivative(model):
-            model = model.without_effect(name)
-        return model
 
     def _added(self, model: Model) -> list[str]:
         return [e for e in model.effects if e not in self.given.effects]
@@ -344,6 +340,13 @@ def retimed(before: Split, after: Split) -> bool:
 def without_derivative(model: Model) -> list[str]:
     """Effects of a model whose size the records show by themselves."""
     return [name for name in model.effects if observed(model.library[name])]
+
+
+def differentiable(model: Model) -> Model:
+    """A model without those."""
+    for name in without_derivative(model):
+        model = model.without_effect(name)
+    return model
 
 
 def with_fitted_values(model: Model, fitted: Model) -> Model:

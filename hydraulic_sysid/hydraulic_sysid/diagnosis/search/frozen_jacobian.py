@@ -71,6 +71,15 @@ def refit_rounded(at: Linearisation, model: Model) -> Refit:
     return Refit(model.with_values(point.parameters.by_key, source="fitted"), point.costs, point.raw)
 
 
+def left_rounded(at: Linearisation, model: Model) -> list[Array]:
+    """What ``model``, with effects without a derivative beyond those of the linearisation, leaves: (S_i,) per record.
+
+    It has its values; only initial states are fitted.
+    """
+    begin = FrozenPoint.at(at, Plant.for_fits(model), at.parameters, at.point.initial_states)
+    return at.costs if begin is None else begin.at_rest(_ROUNDED).costs
+
+
 def _begin(at: Linearisation, model: Model, start: Mapping[str, float], own: Sequence[str]) -> FrozenPoint | None:
     """Where to start: as far towards the prediction as lowers the sum of squares.
 

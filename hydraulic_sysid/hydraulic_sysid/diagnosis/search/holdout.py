@@ -1,8 +1,9 @@
-"""Records cut into segments, and which of them are for fitting, which for validation.
+"""Records cut into segments, and which of them are for fitting, which for validation, and which for a test.
 
 Where no validation records are named, every third block of a few segments of every record is for validation, so that
 both have seen the same experiments; segments for validation never enter a fit, but they steer what is added. Of records
-that have more values than do, blocks are left out, evenly, so that memory and time are bounded.
+that have more values than do, blocks are left out, evenly, so that memory and time are bounded. Test data neither enter
+a fit nor steer anything: records that are named, or else some of the blocks that were left out.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ MOST_VALUES = 80_000  # measured values of all segments, spread: 27 s of three c
 QUICK_VALUES = 24_000  # … and for an answer in seconds; what is small is missed, …
 QUICK_SECONDS = 8.0  # … and of fewer channels or at lower rates so many seconds, over which a fit takes as long, …
 QUICK_LEAST = 6_000  # … that hold so many values
+TEST_VALUES = 20_000  # measured values of all segments for a test, spread over what is left to test on
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
 LOPSIDED = 4.0  # times what the values of one role leave beyond the noise, from which the other has seen little of it
@@ -50,6 +52,8 @@ class Split:
     """Segments that were left out, since the model was far off in these few alone, …"""
     whole: Split | None = None
     """… and the split before any was."""
+    to_test: Sequence[Segments] = ()
+    """Test data, judged by nothing yet."""
 
     @property
     def to_fit(self) -> list[Segments]:
@@ -63,6 +67,11 @@ class Split:
     def records(self, validation: bool = False) -> list[Record]:
         """Those of which at least a part is fitted, or those that are named for ``validation``."""
         return [s.record for s, f in zip(self.segments, self.fit, strict=True) if bool(f.any()) != validation]
+
+    def tested(self) -> list[Record]:
+        """Those that are named to test on."""
+        known = {s.record.name for s in self.segments}
+        return [s.record for s in self.to_test if s.record.name not in known]
 
     def judged(self, segments: Sequence[Segments], near: Sequence[Mask]) -> Split:
         """The same roles for segments of which more is known, without the few that are not ``near[i]`` (S_i,).
@@ -122,28 +131,41 @@ class Split:
 
 
 def split(
-    records: Sequence[Record], validation: Sequence[Record], model: Model, length: float, quick: bool = False
+    records: Sequence[Record],
+    validation: Sequence[Record],
+    model: Model,
+    length: float,
+    quick: bool = False,
+    test: Sequence[Record] = (),
 ) -> Split:
     """Cut ``records`` and those for ``validation`` into segments of ``length`` seconds, what is `set_aside` left out.
 
     Records with more than `MOST_VALUES`, or for a ``quick`` answer `QUICK_VALUES`, are taken at a lower rate, as far as
     the model's resonance allows, and of what is still more, or longer, blocks are left out.
 
+    :param test: records to test on; by default what is left out
     :raises hydraulic_sysid.estimation.errors.SegmentError: a record cannot be cut.
     """
-    every = [*records, *validation]
+    most, number = QUICK_VALUES if quick else MOST_VALUES, len(records) + len(validation)
+    every = [*records, *validation, *test]
     for record in every:
         record.require("drive", "position", error=SegmentError)
     masks, aside = set_aside(model, every, length)
-    factors = _factors(model, every, masks, length, QUICK_VALUES if quick else MOST_VALUES)
+    factors = _factors(model, every[:number], masks[:number], length, most)
+    # One to test on is taken at the rate of what is fitted, as noise is that of a rate.
+    rates = {r.dt: k for r, k in zip(every, factors, strict=False)}
+    factors += [rates.get(r.dt, 1) for r in test]
     slow = [slower(r, k) for r, k in zip(every, factors, strict=True)]
     masks = [_reduced(m, k, len(r)) for m, k, r in zip(masks, factors, slow, strict=True)]
     cuts = cut(slow, model.kind, length, left_out=masks)
-    segments, used = _thinned(cuts, quick)
+    segments, used, left = _thinned(cuts[:number], quick)
+    to_test = _spread(cuts[number:] if test else left, TEST_VALUES)
     if validation:
-        return Split(segments, [np.full(len(s), i < len(records)) for s, i in zip(segments, used, strict=True)], aside)
+        named: list[Mask] = [np.full(len(s), i < len(records)) for s, i in zip(segments, used, strict=True)]
+        return Split(segments, named, aside, to_test=to_test)
     # Shifted from record to record, so that not always the same phase of an experiment is for validation.
-    return Split(segments, [_alternate(np.arange(len(s)), i) for s, i in zip(segments, used, strict=True)], aside)
+    alternating = [_alternate(np.arange(len(s)), i) for s, i in zip(segments, used, strict=True)]
+    return Split(segments, alternating, aside, to_test=to_test)
 
 
 def _factors(
@@ -165,22 +187,32 @@ def _reduced(left_out: Mask, factor: int, count: int) -> Mask:
     return np.asarray(maximum_filter1d(left_out, 3 * factor)[: count * factor : factor])
 
 
-def _thinned(segments: list[Segments], quick: bool) -> tuple[list[Segments], list[int]]:
-    """One block in so many of all records, where there is more than is used; of which records they are."""
+def _thinned(segments: list[Segments], quick: bool) -> tuple[list[Segments], list[int], list[Segments]]:
+    """One block in so many of all records, if there is more than is used, of which records they are, and the rest."""
     values = sum(s.measured.size for s in segments)
     seconds = sum(len(s) * s.samples * s.record.dt for s in segments)
     times = max(values / QUICK_VALUES, min(seconds / QUICK_SECONDS, values // QUICK_LEAST))
     every = ceil(times if quick else values / MOST_VALUES)
-    kept, used, before = [], [], 0
-    for i, s in enumerate(segments):
-        # Blocks are counted on from record to record, so that not the first one of each is kept.
-        block = before + np.arange(len(s)) // BLOCK
-        before = int(block[-1]) + 1
-        chosen = block % every == 0
-        if chosen.any():
-            kept.append(s.subset(chosen) if every > 1 else s)
-            used.append(i)
-    return kept, used
+    chosen = [block % every == 0 for block in _blocks(segments)]
+    kept = [s.subset(c) if every > 1 else s for s, c in zip(segments, chosen, strict=True) if c.any()]
+    left = [s.subset(~c) for s, c in zip(segments, chosen, strict=True) if not c.all()]
+    return kept, [i for i, c in enumerate(chosen) if c.any()], left
+
+
+def _spread(segments: list[Segments], most: int) -> list[Segments]:
+    """One block in so many of these, for no more than about so many values."""
+    every = max(1, ceil(sum(s.measured.size for s in segments) / most))
+    chosen = [(block + i) % every == 0 for i, block in enumerate(_blocks(segments))]  # not each time the same phase
+    return [s.subset(c) for s, c in zip(segments, chosen, strict=True) if c.any()]
+
+
+def _blocks(segments: Sequence[Segments]) -> list[Index]:
+    """The block (S,) that each segment is in, counted on from record to record: not the first of each is kept."""
+    found, before = list[Index](), 0
+    for s in segments:
+        found.append(before + np.arange(len(s)) // BLOCK)
+        before += ceil(len(s) / BLOCK)
+    return found
 
 
 def _alternate(number: Index, shift: int) -> Mask:

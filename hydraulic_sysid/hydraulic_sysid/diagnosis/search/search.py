@@ -44,6 +44,7 @@ from .search_state import CandidateRefit, SearchResult, SearchState
 from .set_aside import accidents
 from .spectral_lines import record_features
 from .uncertainty import Known, parameter_errors
+from .unseen import TriedOut, tried_out
 from .worth import (
     AS_GOOD,
     FURTHER,
@@ -214,6 +215,13 @@ class Search(RecordingFits):
             return fitted((key, value)) - least()
 
         return with_profiles(at, known, () if self.quick or found.stopped else named, cost, sheet)
+
+    def tested(self, found: SearchResult) -> TriedOut | None:
+        """What was found on test data; a quick search leaves that out."""
+        if self.quick:
+            return None
+        self.say("test data")
+        return tried_out(found, self._laws)
 
     def held(self, at: Linearisation, number: tuple[str, float] | None) -> float:
         """What is left of the segments for fitting, a parameter held at a value [SI], all others fitted anew.

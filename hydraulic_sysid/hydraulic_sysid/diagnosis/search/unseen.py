@@ -1,0 +1,106 @@
+"""What models leave of test data, which no fit has seen and no choice either."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
+from hydraulic_sysid.data.display import quantity
+from hydraulic_sysid.estimation.refinement import with_hum, with_nuisance
+from hydraulic_sysid.estimation.segments import Segments
+
+from .fitting import differentiable
+from .frozen_jacobian import left_rounded
+from .holdout import Split
+from .linearisation import Linearisation
+from .search_state import SearchResult
+
+NOTHING_LEFT = "Nothing was left to test on: all data were fitted, or chose what was added."
+
+
+@dataclass(frozen=True)
+class TriedOut:
+    """In words; residual over noise ``before`` and ``after`` on ``seconds`` of these ``records``, if there are any."""
+
+    text: str
+    records: tuple[str, ...] = ()
+    seconds: float = 0.0
+    before: float = 0.0
+    after: float = 0.0
+
+
+def tried_out(result: SearchResult, laws: Callable[[Model], Collection[str]]) -> TriedOut | None:
+    """The model as it was before anything was explained, and the final one, on test data.
+
+    None where the search was ended, where one of them does not run there, and where residuals say little: an effect was
+    named by its force, or the recorded drive is not what the valve got.
+
+    :param laws: of a model, which may be off a little in each segment
+    """
+    split, first = result.split, result.as_recorded or result.base
+    if result.stopped or result.by_force is not None or any(f.linear for f in result.faults):
+        return None
+    if not split.to_test:
+        return TriedOut(NOTHING_LEFT)
+    judged = judged_alike(split.to_test, split.segments)
+    changed = bool(result.added or result.moved or result.faults)
+    # Over the noise of the end, the channels read as they were taken to be read then.
+    readings = [s.readings for s in judged_alike(split.to_test, first.linearisation.split.segments)]
+    try:
+        judged = with_laws(result.final.model, judged, laws)
+        after = left_of(result.final.model, judged)
+        as_recorded = [replace(s, readings=r) for s, r in zip(judged, readings, strict=True)]
+        before = left_of(first.model, as_recorded) if changed else after
+    except SimulationError:
+        return None
+    names = tuple(dict.fromkeys(s.record.name for s in judged))
+    seconds = sum(len(s) * s.samples * s.record.dt for s in judged)
+    shown = names[0] if len(names) == 1 else f"{len(names)} records"
+    fell = f"goes from {before:.3g} to {after:.3g}" if changed else f"is {after:.3g}"
+    text = f"On unseen data ({quantity(seconds, 's', 3)} of {shown}) the residual {fell} × noise."
+    return TriedOut(text, names, seconds, before, after)
+
+
+def judged_alike(segments: Sequence[Segments], known: Sequence[Segments]) -> list[Segments]:
+    """Segments with noise, readings and hum of those that are ``known``: of their record, or else of one like it."""
+    found = []
+    for s in segments:
+        alike = [k for k in known if k.channels == s.channels and np.isclose(k.record.dt, s.record.dt)]
+        own = next((k for k in alike if k.record.name == s.record.name), alike[0] if alike else None)
+        if own is not None:
+            s = with_hum(replace(s.with_noise(own.noise), readings=own.readings, hum=own.hum))
+        found.append(s)
+    return found
+
+
+def with_laws(
+    model: Model, segments: Sequence[Segments], laws: Callable[[Model], Collection[str]]
+) -> list[Segments]:
+    """Segments that let the laws of a model be off a little, each in each segment on its own, as a search does.
+
+    :raises SimulationError: the model does not run.
+    """
+    smooth = differentiable(model)
+    at = Linearisation.of(smooth, all_fitted(segments))
+    return with_nuisance(at.point, at.columns, laws(smooth))
+
+
+def left_of(model: Model, segments: Sequence[Segments]) -> float:
+    """Residual over noise that a model leaves with the values that it has; only initial states are fitted.
+
+    :raises SimulationError: it does not run.
+    """
+    smooth = differentiable(model)
+    at = Linearisation.of(smooth, all_fitted(segments))
+    costs = at.costs if smooth is model else left_rounded(at, model)
+    left, count = sum(float(c.sum()) for c in costs), sum(int(s.counted.sum()) for s in segments)
+    return float(np.sqrt(left / max(count, 1)))
+
+
+def all_fitted(segments: Sequence[Segments]) -> Split:
+    """Segments that all have one role."""
+    return Split(list(segments), [np.ones(len(s), dtype=bool) for s in segments])
