@@ -11,6 +11,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import add
 from hydraulic_sysid.diagnosis.search.holdout import TEST_VALUES, Split, split
+from hydraulic_sysid.diagnosis.search.unseen import judged_alike
 from hydraulic_sysid.estimation.segments import Segments
 
 DT, NOISE = 1e-3, {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}
@@ -64,6 +65,18 @@ def test_records_that_are_named_are_tested_on_whole(model: Model) -> None:
 
 def roles(parts: Split) -> list[tuple[str, list[int], list[bool]]]:
     return [(s.record.name, s.first.tolist(), f.tolist()) for s, f in zip(parts.segments, parts.fit, strict=True)]
+
+
+def test_at_another_rate_noise_is_as_strong(model: Model) -> None:
+    """A filtered record by itself would be held to next to nothing."""
+    bench = model.with_effect("valve_deadband", {"width": 0.03})
+    slow = swept(bench, "slow", 6.0, 4)
+    smooth = {c: np.convolve(np.pad(slow[c], 2, mode="edge"), np.full(5, 0.2), mode="valid")[::4] for c in NOISE}
+    unseen = Record.sampled("slow", 4.0 * DT, {"drive": slow["drive"][::4], **smooth})
+    split_up = split([swept(bench, "fast", 6.0, 5)], [], model, 0.5, test=[unseen])
+    (judged,) = judged_alike(split_up.to_test, split_up.segments)
+    np.testing.assert_allclose(judged.noise_std, list(NOISE.values()), rtol=0.1)
+    assert (split_up.to_test[0].noise_std < 0.7 * judged.noise_std).all()
 
 
 def test_test_data_change_nothing_but_what_is_said_of_them(model: Model) -> None:

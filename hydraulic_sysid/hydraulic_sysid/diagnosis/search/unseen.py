@@ -10,6 +10,7 @@ import numpy as np
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import quantity
+from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.refinement import with_hum, with_nuisance
 from hydraulic_sysid.estimation.segments import Segments
 
@@ -66,13 +67,18 @@ def tried_out(result: SearchResult, laws: Callable[[Model], Collection[str]]) ->
 
 
 def judged_alike(segments: Sequence[Segments], known: Sequence[Segments]) -> list[Segments]:
-    """Segments with noise, readings and hum of those that are ``known``: of their record, or else of one like it."""
+    """Segments with noise, readings and hum of those that are ``known``: of their record, or else of one like it.
+
+    At another rate noise has another colour: it is taken for white, and as strong.
+    """
     found = []
     for s in segments:
-        alike = [k for k in known if k.channels == s.channels and np.isclose(k.record.dt, s.record.dt)]
-        own = next((k for k in alike if k.record.name == s.record.name), alike[0] if alike else None)
-        if own is not None:
-            s = with_hum(replace(s.with_noise(own.noise), readings=own.readings, hum=own.hum))
+        alike = [k for k in known if k.channels == s.channels]
+        if alike:
+            own = min(alike, key=lambda k: (k.record.name != s.record.name, not np.isclose(k.record.dt, s.record.dt)))
+            same = np.isclose(own.record.dt, s.record.dt)
+            noise = own.noise if same else [ChannelNoise.white(n.std) for n in own.noise]
+            s = with_hum(replace(s.with_noise(noise), readings=own.readings, hum=own.hum))
         found.append(s)
     return found
 
