@@ -14,6 +14,7 @@ from numba import types
 from hydraulic_node_utils import generated_code
 
 from . import kernels
+from .acting import Acting
 from .compose import Layout, write_module
 from .errors import EffectError
 from .registry import Library
@@ -35,6 +36,13 @@ class CompiledPlant:
         self.run: Callable = self.module.run
         self.run_many: Callable = self.module.run_many
         self.track: Callable = self.module.track
+        self._acting: dict[tuple[str, ...], Acting] = {}
+
+    def acting(self, names: tuple[str, ...]) -> Acting:
+        """What follows from these effects being on."""
+        if names not in self._acting:
+            self._acting[names] = Acting(self.layout, tuple(self.layout.library[name] for name in names))
+        return self._acting[names]
 
 
 def _load(library: Library) -> ModuleType:

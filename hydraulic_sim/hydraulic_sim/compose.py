@@ -60,6 +60,11 @@ class Layout:
         return {key: i for i, key in enumerate(self.state_records)}
 
     @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        """Keys of the states, in the order of X."""
+        return tuple(self.states)
+
+    @cached_property
     def n_rates(self) -> int:
         """How many of the states are rate states."""
         return sum(s.kind == "rate" for s in self.state_records.values())

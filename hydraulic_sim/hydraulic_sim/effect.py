@@ -22,6 +22,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from .errors import EffectError
 
@@ -153,6 +154,7 @@ class Effect:
         return found
 
 
+@lru_cache(maxsize=1024)
 def arguments(function: Callable) -> tuple[str, ...]:
     """The argument names of a kernel, in order."""
     return tuple(inspect.signature(function).parameters)

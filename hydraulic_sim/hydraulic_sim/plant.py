@@ -10,23 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import base, rates
+from .acting import STOPS
 from .arrays import Array
 from .compiled import compiled
-from .effect import Effect, arguments
+from .effect import arguments
 from .embedded import Embedded
 from .errors import SimulationError
 from .model import Model
-from .slots import OF_COMMAND, PER_SAMPLE, SLOTS
 from .trajectory import PlantState, Trajectory
 
 LONGEST_MEMORY = 256  # samples of past drive that effects on the command may need
 LONGEST_STEP = 5e-4  # s; shortened where an effect or the oil is faster
-STOPS = "end_stop"
 # s, and how much longer than otherwise: off by a hundredth of the sensors' noise on all benches tried
 FIT_STEP, FIT_REFINEMENT = {"hydraulic": 1e-3, "mechanical": 5e-3}, 2.2
 YIELDS = {"hydraulic": 1e-5, "mechanical": 1e-4}  # of the stroke, by the full force: less than sensors of such see
 HEAVY = 1e6
-_OF_FORCES = ("moving_mass", "drive_force", "bristle_length", "bristle_time")  # base parameters of forces alone
 _READINGS = 4  # of the outputs, the first: what sensors read
 FOLLOWED = 1e-3  # change of an output, of its range, by half the step that still counts as following the physics
 MOST_HALVINGS = 6
@@ -55,13 +53,18 @@ class Plant:
             self._on[layout.effects[name]] = 1
         self._parameters = np.array([model.value(key) for key in layout.parameters])
         self._hydraulic = np.uint8(model.kind == "hydraulic")
-        self._remembers = any(layout.library[name].slot == "command" for name in active)
-        self._active = tuple(layout.library[name] for name in active)
+        self._acting = self._compiled.acting(active)
         values = self._values()
         self.refinement, self._allowed_step = refinement, longest_step
-        self.longest_step = rates.step(rates.fastest(self._active, values, model.kind), longest_step, refinement)
-        self._clear_step = rates.step(rates.fastest(self._but_stops, values, model.kind), longest_step, refinement)
-        self._shortest_dt = rates.shortest_sampling(self._active, values)
+        fastest, clear = self._fastest(values)
+        self.longest_step, self._clear_step = (rates.step(r, longest_step, refinement) for r in (fastest, clear))
+        self._shortest_dt = rates.shortest_sampling(self._acting.effects, values)
+
+    def _fastest(self, values: dict[str, float]) -> tuple[float, float]:
+        """The fastest rate [1/s] for such values, and that away from the stops."""
+        causes = rates.by_cause(self._acting.effects, values, self.model.kind)
+        clear = (rate for name, rate in causes.items() if name != STOPS)
+        return max(causes.values(), default=0.0), max(clear, default=0.0)
 
     def _values(self) -> dict[str, float]:
         return dict(zip(self.layout.parameters, self._parameters.tolist(), strict=True))
@@ -99,22 +102,21 @@ class Plant:
     @property
     def fastest(self) -> tuple[str, float, float]:
         """What asks for the shortest steps away from the stops: an effect or ``oil``, its rate [1/s], the step [s]."""
-        causes = rates.by_cause(self._but_stops, self._values(), self.model.kind)
+        causes = rates.by_cause(self._acting.but_stops, self._values(), self.model.kind)
         cause = max(causes, key=lambda name: causes[name], default="")
         return cause, causes.get(cause, 0.0), self._clear_step
 
     def held(self) -> Plant:
         """This plant with a piston so heavy that no force moves it within a few samples: it goes where it was seen."""
         other = self.with_parameters({"moving_mass": HEAVY * self.value("moving_mass")})
-        rate = rates.fastest(other._active, other._values(), self.model.kind)
+        rate, _ = other._fastest(other._values())
         other.longest_step = rates.step(rate, self._allowed_step, self.refinement)
         return other
 
     @property
     def path(self) -> tuple[float | str, ...]:
         """All that a plant's motion follows from besides the drive: effects and values, without those of sensors."""
-        acting = [e for e in self._active if SLOTS[e.slot].subsystem != "sensor"]
-        return self._values_of(acting, [k for k in self.layout.parameters if "." not in k])
+        return self._acting.motion.path(self._parameters)
 
     @property
     def held_path(self) -> tuple[float | str, ...]:
@@ -122,22 +124,17 @@ class Plant:
 
         Forces move nothing there, and what sensors read comes after.
         """
-        acting = [e for e in self._active if SLOTS[e.slot].subsystem not in ("force", "sensor")]
-        return self._values_of(acting, [k for k in self.layout.parameters if "." not in k and k not in _OF_FORCES])
+        return self._acting.held.path(self._parameters)
 
     @property
     def inner_path(self) -> tuple[float | str, ...]:
         """What the memory of inner states hangs on beside what is seen and the drive: their effects and the values."""
-        return self._values_of(self._inner_effects, ["drive_limit"])
-
-    def _values_of(self, effects: Sequence[Effect], base_keys: Sequence[str]) -> tuple[float | str, ...]:
-        keys = [*base_keys, *(f"{e.name}.{p.name}" for e in effects for p in e.parameters)]
-        return (*(e.name for e in effects), *(self.value(k) for k in keys))
+        return self._acting.memory.path(self._parameters)
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Keys of the states, in the order of their array."""
-        return tuple(self.layout.states)
+        return self.layout.state_names
 
     def with_parameters(self, values: dict[str, float]) -> Plant:
         """This plant with other parameter values (SI); nothing is compiled. For fits: bounds are not checked.
@@ -158,19 +155,16 @@ class Plant:
                 self.model.parameter(key)
                 raise
         now = other._values()
-        other.longest_step = self._followed(self._active, now, self.longest_step)
-        other._clear_step = self._followed(self._but_stops, now, self._clear_step)
-        other._shortest_dt = rates.shortest_sampling(self._active, now)
+        fastest, clear = other._fastest(now)
+        other.longest_step = self._followed(fastest, self.longest_step)
+        other._clear_step = self._followed(clear, self._clear_step)
+        other._shortest_dt = rates.shortest_sampling(self._acting.effects, now)
         return other
 
-    def _followed(self, active: Iterable[Effect], values: dict[str, float], longest: float) -> float:
+    def _followed(self, rate: float, longest: float) -> float:
         """The ``longest`` step [s], or a shorter one for physics that has become too fast for it."""
-        step = rates.step(rates.fastest(active, values, self.model.kind), longest, self.refinement)
+        step = rates.step(rate, longest, self.refinement)
         return step if step < min(0.5 * self.refinement, 0.75) * longest else longest
-
-    @property
-    def _but_stops(self) -> tuple[Effect, ...]:
-        return tuple(e for e in self._active if e.name != STOPS)
 
     def clear_of_stops(self) -> Plant:
         """This plant for a piston that stays clear of its end stops: without them, where they ask for shorter steps.
@@ -180,7 +174,8 @@ class Plant:
         if self._clear_step <= self.longest_step:
             return self
         other = copy.copy(self)
-        other._on, other._active = self._on.copy(), self._but_stops
+        other._on = self._on.copy()
+        other._acting = self._compiled.acting(tuple(e.name for e in self._acting.but_stops))
         other._on[self.layout.effects[STOPS]] = 0
         other.longest_step = self._clear_step
         return other
@@ -192,13 +187,13 @@ class Plant:
     @property
     def closes_a_loop(self) -> bool:
         """Whether a controller inside the actuator follows a commanded position: then the drive is that command."""
-        return any(e.slot == "loop" for e in self._active)
+        return self._acting.closes_a_loop
 
     @property
     def mass(self) -> float:
         """All that moves with the piston [kg]: moving_mass and what effects put on."""
         total = self.value("moving_mass")
-        for e in self._active:
+        for e in self._acting.effects:
             if e.slot == "inertia":
                 total += e.kernel(*(self.value(f"{e.name}.{name}") for name in arguments(e.kernel)))
         return total
@@ -206,7 +201,7 @@ class Plant:
     @property
     def bristle_length(self) -> float:
         """The sliding distance over which dry friction turns [m], as effects leave it."""
-        return rates.bristles(self._active, self._values())["bristle_length"]
+        return rates.bristles(self._acting.effects, self._values())["bristle_length"]
 
     def initial_state(
         self,
@@ -322,7 +317,7 @@ class Plant:
         wanted = np.array([base.OUTPUTS.index(name) for name in channels], dtype=np.int64)
         out = np.empty((len(first), horizon + 1, len(wanted)))
         failure = np.zeros(2)
-        past = LONGEST_MEMORY if self._remembers and memories is None else 0
+        past = LONGEST_MEMORY if self._acting.remembers and memories is None else 0
         if memories is None:
             memories = np.zeros((len(first), self.layout.n_memory))
         if shown is not None and self.begins_shown:
@@ -348,7 +343,8 @@ class Plant:
 
     def _with_shown(self, memories: Array, reading: Array, hidden: float) -> Array:
         """Memories (S, n_memory) in which those of the position's sensor begin with what it showed (S,)."""
-        last = max((e for e in self._active if e.begins_shown), key=lambda e: e.order)  # what it gives is what is shown
+        having = [e for e in self._acting.effects if e.begins_shown]
+        last = max(having, key=lambda e: e.order)  # what it gives is what is shown
         start = self.layout.memories[last.name].start
         memories = memories.copy()
         memories[:, start], memories[:, start + 1], memories[:, start + 2] = -1.0, reading, hidden
@@ -357,22 +353,21 @@ class Plant:
     @property
     def begins_shown(self) -> bool:
         """Whether the memory of a position sensor may begin with what the sensor showed."""
-        return any(e.begins_shown for e in self._active)
+        return self._acting.begins_shown
 
     @property
     def has_inner_states(self) -> bool:
         """Whether an effect that is on has states of its own, which no sensor sees, or never forgets a drive."""
-        return any(e.states for e in self._active) or bool(self.lasting_memories)
+        return self._acting.has_inner_states
 
     @property
     def lasting_memories(self) -> list[int]:
         """Places in the array of memories of those that may keep what is longer past than `LONGEST_MEMORY` samples."""
-        lasting = [e for e in self._active if e.memory and e.reach is None and not e.slot.endswith("_sensor")]
-        return [k for e in lasting for k in range(self.layout.n_memory)[self.layout.memories[e.name]]]
+        return self._acting.lasting_memories
 
     def driven(self) -> Plant:
         """This plant without all that its `drive_path` has nothing to do with: `track` is faster there."""
-        other, inner = copy.copy(self), self._inner_effects
+        other, inner = copy.copy(self), self._acting.inner
         other._on = np.zeros_like(self._on)
         for e in inner:
             other._on[self.layout.effects[e.name]] = 1
@@ -382,25 +377,12 @@ class Plant:
         return other
 
     @property
-    def _inner_effects(self) -> list[Effect]:
-        return [e for e in self._active if e.states or e.slot == "command"]
-
-    @property
     def drive_path(self) -> tuple[float | str, ...] | None:
         """All that inner states follow from besides the drive: effects and values; None where the motion matters too.
 
         Plants of one library with the same path propagate a record to the same inner states.
         """
-        inner = self._inner_effects
-        if self.closes_a_loop:
-            return None
-        alone = {"command", "t", *PER_SAMPLE, *OF_COMMAND}
-        for e in inner:
-            own = {p.name for p in e.parameters} | {s.name for s in e.states}
-            taken = arguments(e.dynamics) if e.dynamics else arguments(e.kernel)
-            if not alone.issuperset(set(taken) - own):
-                return None
-        return self.inner_path
+        return self.inner_path if self._acting.follows_the_drive_alone else None
 
     def track(
         self, drive: ArrayLike, dt: float, starts: ArrayLike, seen: ArrayLike, run_up: int | None = None

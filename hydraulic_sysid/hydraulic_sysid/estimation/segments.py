@@ -26,7 +26,7 @@ from .noise import noise_std, robust_noise_std, spikes, without
 from .noise_model import ChannelNoise
 from .projection import Explained, project_out
 from .recording import Reading
-from .run_ups import RunUps
+from .run_ups import RunUps, longest_worth
 from .saturation import runs
 from .velocity_filter import VelocityFilter
 from .whitened_residual import residual
@@ -126,6 +126,11 @@ class Segments:
     def drive(self) -> Array:
         """(N,) [V] of the whole record, in an array that compiled code takes as it is."""
         return np.array(self.record["drive"])
+
+    @cached_property
+    def longest_run_up(self) -> int:
+        """Samples of the longest run-up to the segments that saves much."""
+        return longest_worth(self.first)
 
     @cached_property
     def _missing(self) -> list[list[tuple[int, Array]]]:
@@ -311,12 +316,12 @@ class Segments:
         shown = position[self.first] / (1.0 + reading.gain) + reading.delay * velocity[self.first]
         return shown, float(self.noise_std[channel]) / max(usual, 1e-300)
 
-    @property
+    @cached_property
     def tracked(self) -> list[int]:
         """States that are pressures without a sensor."""
         return [int(k) for k, pressure in zip(self.free, self.unmeasured_pressures, strict=True) if pressure]
 
-    @property
+    @cached_property
     def unmeasured_pressures(self) -> Mask:
         """(F,) which of the estimated states are pressures without a sensor."""
         return np.array([_STATES[k] not in (*self.channels, "velocity") for k in self.free])

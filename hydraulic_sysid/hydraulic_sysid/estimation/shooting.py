@@ -17,7 +17,7 @@ from hydraulic_sim.plant import Plant
 from .parallel import results
 from .parameters import Parameters
 from .projection import Projection
-from .run_ups import longest_worth, sufficient
+from .run_ups import sufficient
 from .segments import Segments
 
 T = TypeVar("T")
@@ -247,26 +247,34 @@ class Shooting:
         if plant.has_inner_states:
             measured = segments.smoothed.shape[1]
             columns = [k for k, name in enumerate(plant.state_names) if k >= measured and name != "stick"]
-            path = plant.drive_path
-            tracked = plant if path is None else plant.driven()
-            found = Inner(columns, *self._track(tracked, i, path or plant.path, plant.inner_path, columns))
+            path, inner = plant.drive_path, plant.inner_path
+            tracked = None if path is None else plant.driven
+            found = Inner(columns, *self._track(plant, tracked, i, path or plant.path, inner, columns))
         if segments.tracked:
             # The piston moves as it was seen to, whatever its forces.
             path = ("held", *plant.held_path)
-            values, _ = self._track(plant.held(), i, path, path, segments.tracked)
+            values, _ = self._track(plant, plant.held, i, path, path, segments.tracked)
             found = replace(found, pressures=(segments.tracked, values))
         return found
 
     def _track(
-        self, plant: Plant, i: int, path: tuple[float | str, ...], hangs_on: tuple[float | str, ...], columns: list[int]
+        self,
+        plant: Plant,
+        made: Callable[[], Plant] | None,
+        i: int,
+        path: tuple[float | str, ...],
+        hangs_on: tuple[float | str, ...],
+        columns: list[int],
     ) -> tuple[Array, Array]:
         """States and memories at each segment; those of another plant of the same ``path``, where there was one.
 
-        Only these ``columns`` of the states are of use; their memory ``hangs_on`` these effects and values.
+        What is ``made`` of the plant is propagated. Only these ``columns`` of the states are of use; their memory
+        ``hangs_on`` these effects and values.
         """
         key = (i, path, plant.layout.places)
         known = self._known.get(key)
         if known is None:
+            plant = plant if made is None else made()
             if len(self._known) > _MOST_KNOWN:
                 self._known.clear()
             segments, run_up = self.segments[i], self._run_up(plant, i, hangs_on, columns)
@@ -277,7 +285,7 @@ class Shooting:
     def _run_up(self, plant: Plant, i: int, hangs_on: tuple[float | str, ...], columns: list[int]) -> int | None:
         """Samples before each segment from which on such a plant is propagated; None: from the beginning."""
         segments = self.segments[i]
-        most = longest_worth(segments.first)
+        most = segments.longest_run_up
         if not most or (plant.lasting_memories and plant.drive_path is None):  # what never forgets the motion
             return None
 

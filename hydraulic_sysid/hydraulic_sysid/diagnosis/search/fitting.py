@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import TypeVar
 
 import numpy as np
@@ -102,7 +102,7 @@ class Fitting:
         try:
             cuts = split(records, validation, model, length, quick, test)
             quarter = shorter(length, SHORTER, [*records, *validation])
-            short = partial(split, records, validation, model, quarter, quick)
+            short = cache(partial(split, records, validation, model, quarter, quick))
             progress = Progress(say, within, watch or (lambda _: None))
             return cls(Task(model, cuts, short, replace(settings, length=length), progress, quick))
         except SegmentError as error:
