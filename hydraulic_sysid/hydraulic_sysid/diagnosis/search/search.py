@@ -74,6 +74,7 @@ class Search(RecordingFits):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         self._judged_with: set[str] = set()
+        self._in_time = task.say.within is not None
         self._curves: tuple[Linearisation, list[NonparametricCurve]] | None = None
 
     def begin(self) -> SearchState:
@@ -203,7 +204,7 @@ class Search(RecordingFits):
     def known_of(self, found: SearchResult, named: Collection[str]) -> dict[str, Known]:
         """How well the parameters of the final model are known; those that are ``named`` by what they cost elsewhere.
 
-        A quick search leaves these fits out.
+        A search that is to be quick, or done in time, leaves these fits out.
         """
         at, sheet = found.final.linearisation, tolerances(found.model)
         known = parameter_errors(at, sheet)
@@ -214,7 +215,7 @@ class Search(RecordingFits):
             self.say(f"the interval of {key}")
             return fitted((key, value)) - least()
 
-        return with_profiles(at, known, () if self.quick or found.stopped else named, cost, sheet)
+        return with_profiles(at, known, () if self.quick or self._in_time else named, cost, sheet)
 
     def tested(self, found: SearchResult) -> TriedOut | None:
         """What was found on test data; a quick search leaves that out."""

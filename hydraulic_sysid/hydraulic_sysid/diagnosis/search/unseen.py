@@ -61,7 +61,8 @@ def tried_out(result: SearchResult, laws: Callable[[Model], Collection[str]]) ->
     names = tuple(dict.fromkeys(s.record.name for s in judged))
     seconds = sum(len(s) * s.samples * s.record.dt for s in judged)
     shown = names[0] if len(names) == 1 else f"{len(names)} records"
-    fell = f"goes from {before:.3g} to {after:.3g}" if changed else f"is {after:.3g}"
+    how = "falls" if after < before else "goes"
+    fell = f"{how} from {before:.3g} to {after:.3g}" if changed else f"is {after:.3g}"
     text = f"On unseen data ({quantity(seconds, 's', 3)} of {shown}) the residual {fell} × noise."
     return TriedOut(text, names, seconds, before, after)
 
