@@ -3,7 +3,7 @@
 The scores of segments, and of whole records, are taken as independent clusters (`estimation.covariance`); the larger
 error of the two counts. What a record says of a parameter depends on its experiment where the law of an effect is not
 quite the true one; the scatter between records then holds that too. What all records share of that they cannot show: no
-law of a library is that of a bench. It is taken to be as large again as the scatter, and never less than a share of the
+law of a library is that of a bench. It is taken to be much larger than the scatter, and never less than a share of the
 value (a model discrepancy in the sense of Kennedy & O'Hagan, J. R. Statist. Soc. B 63 (2001)). The laws of effects are
 the rougher ones, and what shapes them is the roughest; numbers of a data sheet are of gauges and drawings, not of laws.
 Both were chosen on 47 parameters of effects of the seeds 104001 to 106001 (others: docs/diagnosis-matrix.md).
@@ -31,10 +31,9 @@ from hydraulic_sysid.estimation.covariance import inverse, sandwich
 
 from .linearisation import Linearisation
 
-SHARED = 2.0  # times the scatter of an effect's parameter: its error, with what all segments and records share of it
-_LAW = 0.01  # of a parameter's value: standard error for the law that it stands in, of the base physics …
-_EFFECT = 0.02  # … of an effect …
-_SHAPE = 0.04  # … and of what shapes its law (a speed, a gap, a time), which others write down otherwise
+SHARED = 3.0  # times the scatter of an effect's parameter: its error, with what all segments and records share of it
+_LAW = 0.01  # of a parameter's value: standard error for the law that it stands in, …
+_SHAPE = 0.02  # … of what shapes the law of an effect (a speed, a gap, a time), which others write down otherwise
 _COVERED = 0.95
 _FEWEST = 3  # records whose scatter says something
 _STEP = 0.25  # of a tolerance: how far a held number is moved to see what it changes
@@ -120,7 +119,7 @@ def law_share(model: Model, key: str) -> float:
     record = model.parameter(key)
     if "." not in key:
         return _LAW if record.free or record.nuisance else 0.0
-    return _SHAPE if record.null is None else _EFFECT
+    return _SHAPE if record.null is None else _LAW
 
 
 def _of_held(at: Linearisation, free: Index, bread: Array, tolerances: Mapping[str, float]) -> Array:
