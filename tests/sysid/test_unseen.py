@@ -79,6 +79,17 @@ def test_at_another_rate_noise_is_as_strong(model: Model) -> None:
     assert (split_up.to_test[0].noise_std < 0.7 * judged.noise_std).all()
 
 
+def test_spikes_of_test_data_do_not_count(model: Model) -> None:
+    """Nor do they in what is fitted."""
+    bench = model.with_effect("valve_deadband", {"width": 0.03})
+    spiky, draw = swept(bench, "spiky", 5.0, 6), np.random.default_rng(7)
+    hit = draw.random(len(spiky)) < 0.005
+    channels = {c: spiky[c] + 30.0 * NOISE[c] * hit * draw.choice([-1.0, 1.0], hit.size) for c in NOISE}
+    unseen = Record.sampled("spiky", DT, {"drive": spiky["drive"], **channels})
+    found = add(model, "valve_deadband", [swept(bench, "known", 8.0, 8)], test=[unseen])
+    assert 0.9 < found.result["test"]["after"] < 1.05
+
+
 def test_test_data_change_nothing_but_what_is_said_of_them(model: Model) -> None:
     """One record that follows the law that is added, and one that does not, say what they are; the fit is the same."""
     bench = model.with_effect("valve_deadband", {"width": 0.03})

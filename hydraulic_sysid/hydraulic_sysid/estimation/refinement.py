@@ -71,10 +71,14 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
     return found
 
 
-def with_nuisance(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) -> list[Segments]:
-    """The point's segments as they are known to be recorded, every law off a little as in `refined`."""
-    shares, every = _shares(point.parameters, laws), zip(point.shooting.segments, columns, strict=True)
-    return [_with_nuisance(s, _raw_columns(s, own, shares)) for s, own in every]
+def without_outliers(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) -> list[Segments]:
+    """The point's segments without their outliers, every law off a little, as in `refined`; the rest is known."""
+    segments, shares = point.shooting.segments, _shares(point.parameters, laws)
+    channels = list(dict.fromkeys(c for s in segments for c in s.channels))
+    left = [s.in_units(p.residual) for s, p in zip(segments, point.projections, strict=True)]
+    spikes = _spikes(point, left, channels, noise_model.SPIKY)
+    every = zip(segments, spikes, columns, strict=True)
+    return [_with_nuisance(replace(s, outliers=out), _raw_columns(s, own, shares)) for s, out, own in every]
 
 
 def with_hum(segments: Segments) -> Segments:

@@ -11,7 +11,7 @@ from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import quantity
 from hydraulic_sysid.estimation.noise_model import ChannelNoise
-from hydraulic_sysid.estimation.refinement import with_hum, with_nuisance
+from hydraulic_sysid.estimation.refinement import with_hum, without_outliers
 from hydraulic_sysid.estimation.segments import Segments
 
 from .fitting import differentiable
@@ -87,13 +87,13 @@ def judged_alike(segments: Sequence[Segments], known: Sequence[Segments]) -> lis
 def with_laws(
     model: Model, segments: Sequence[Segments], laws: Callable[[Model], Collection[str]]
 ) -> list[Segments]:
-    """Segments that let the laws of a model be off a little, each in each segment on its own, as a search does.
+    """Segments without outliers that let the laws of a model be off a little, each in each on its own, as in a search.
 
     :raises SimulationError: the model does not run.
     """
     smooth = differentiable(model)
     at = Linearisation.of(smooth, all_fitted(segments))
-    return with_nuisance(at.point, at.columns, laws(smooth))
+    return without_outliers(at.point, at.columns, laws(smooth))
 
 
 def left_of(model: Model, segments: Sequence[Segments]) -> float:
