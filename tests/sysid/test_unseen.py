@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,10 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import add
 from hydraulic_sysid.diagnosis.search.holdout import TEST_VALUES, Split, split
+from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError
+from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.unseen import judged_alike
+from hydraulic_sysid.estimation.fit import FitSettings
 from hydraulic_sysid.estimation.segments import Segments
 
 DT, NOISE = 1e-3, {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}
@@ -77,6 +82,22 @@ def test_at_another_rate_noise_is_as_strong(model: Model) -> None:
     (judged,) = judged_alike(split_up.to_test, split_up.segments)
     np.testing.assert_allclose(judged.noise_std, list(NOISE.values()), rtol=0.1)
     assert (split_up.to_test[0].noise_std < 0.7 * judged.noise_std).all()
+
+
+def test_a_search_whose_time_is_over_still_says_what_it_found(model: Model) -> None:
+    """What is told of it takes its time; no fits for intervals are begun then."""
+    bench = model.with_effect("valve_deadband", {"width": 0.03})
+    record = swept(bench, "known", 6.0, 9)
+    told = list[str]()
+    more = swept(bench, "more", 3.0, 10)
+    search = Search.of(model, [record], [], FitSettings(), told.append, within=3600.0, test=[more])
+    found = search.add("valve_deadband")
+    search.say = replace(search.say, within=1e-9)  # over
+    with pytest.raises(OutOfTimeError):
+        search.say("next")
+    known, tested = search.known_of(found, found.named), search.tested(found)
+    assert known["valve_deadband.width"].standard_error < 0.003 and tested is not None and tested.after < 1.05
+    assert not any("interval" in text for text in told)
 
 
 def test_spikes_of_test_data_do_not_count(model: Model) -> None:

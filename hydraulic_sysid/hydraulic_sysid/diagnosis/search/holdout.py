@@ -69,7 +69,7 @@ class Split:
         return [s.record for s, f in zip(self.segments, self.fit, strict=True) if bool(f.any()) != validation]
 
     def tested(self) -> list[Record]:
-        """Those that are named to test on."""
+        """Those that are for the test alone, as those that are named for it."""
         known = {s.record.name for s in self.segments}
         return [s.record for s in self.to_test if s.record.name not in known]
 

@@ -204,8 +204,10 @@ class Search(RecordingFits):
     def known_of(self, found: SearchResult, named: Collection[str]) -> dict[str, Known]:
         """How well the parameters of the final model are known; those that are ``named`` by what they cost elsewhere.
 
-        A search that is to be quick, or done in time, leaves these fits out.
+        The search is done: its time may be over meanwhile. One that is to be quick, or done in time, or that was ended,
+        leaves these fits out.
         """
+        self.say = replace(self.say, within=None)
         at, sheet = found.final.linearisation, tolerances(found.model)
         known = parameter_errors(at, sheet)
         fitted = partial(self.held, at)
@@ -215,7 +217,8 @@ class Search(RecordingFits):
             self.say(f"the interval of {key}")
             return fitted((key, value)) - least()
 
-        return with_profiles(at, known, () if self.quick or self._in_time else named, cost, sheet)
+        hurried = self.quick or self._in_time or found.stopped
+        return with_profiles(at, known, () if hurried else named, cost, sheet)
 
     def tested(self, found: SearchResult) -> TriedOut | None:
         """What was found on test data; a quick search leaves that out."""
