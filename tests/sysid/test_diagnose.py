@@ -473,6 +473,14 @@ def test_an_interval_that_holds_nothing(
     assert uncertainty.may_be_nothing(at, with_it.library["structural_flexibility"]) is nothing
 
 
+def test_what_is_named_is_how_large_effects_are(model) -> None:
+    """Their intervals are sought by fits; those of shapes are not."""
+    final = state(model.with_effect("entrained_air", {"fraction": 0.04, "exponent": 1.2}), 3000.0, {})
+    base = state(model, 8000.0, {})
+    result = SearchResult(model, Split([], []), FitSettings(), base, final, {"entrained_air": final.misfit}, {})
+    assert result.named == ["entrained_air.fraction"]
+
+
 @pytest.mark.parametrize("exponent", [1.2, 1.4])
 def test_a_shape_that_is_usually_at_its_limit_is_not_bent(model, exponent: float) -> None:
     """Air that is compressed in no time is adiabatic."""

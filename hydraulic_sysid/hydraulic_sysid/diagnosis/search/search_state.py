@@ -145,9 +145,9 @@ class SearchResult:
 
     @property
     def named(self) -> list[str]:
-        """Keys of what is said to be there: parameters of the effects added, numbers of the data sheet."""
+        """Keys of what is said to be there: how large the effects added are, not their shapes; numbers of the sheet."""
         library = self.final.model.library
-        own = [f"{name}.{p.name}" for name in self.added for p in library[name].parameters]
+        own = [f"{name}.{p.name}" for name in self.added for p in library[name].parameters if p.null is not None]
         return [*own, *(d.key for d in self.moved)]
 
     @cached_property
