@@ -283,6 +283,11 @@ def test_add_fits_an_effect_and_says_whether_the_data_bear_it_out(
     assert_cannot_inject(json.loads((tmp_path / "right" / "add.json").read_text()))
     assert done["residual"]["after"]["validation"] < 1.05 < 1.5 < done["residual"]["before"]["validation"]
     assert "valve_deadband" in load_model(tmp_path / "right" / "model.yaml").effects
+    steering = ["--validation" if word == "--holdout" else word for word in command]
+    assert add_main(["valve_deadband", *steering, "--out", str(tmp_path / "steered")]) == 0
+    steered = json.loads(capsys.readouterr().out)
+    assert [r["name"] for r in steered["records"] if r["role"] == "validation"] == done["test"]["records"]
+    assert "Nothing was left to test on" in steered["verdict"]["text"] and steered["test"] is None
     assert add_main(["no_such_effect", *command, "--out", str(tmp_path / "none")]) == 2
     assert "no_such_effect" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()

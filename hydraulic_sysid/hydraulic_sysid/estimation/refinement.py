@@ -60,14 +60,14 @@ def refined(point: FitPoint, columns: Sequence[Array], laws: Collection[str]) ->
         for (i, c), own in zip(where, strength, strict=True):
             loud[i][near[i], c] = own
         noise[channel] = noise_model.estimate([q / own[:, None] for q, own in zip(quiet, strength, strict=True)], dt)
-    found = []
+    found, shares = [], _shares(point.parameters, laws)
     for i, s in enumerate(segments):
         readings = tuple(replace(t, delay=late.get(c, t.delay)) for c, t in zip(s.channels, s.readings, strict=True))
         judged = replace(
             s, loudness=loud[i], outliers=spikes[i], readings=readings, hum=tuple(lines[c] for c in s.channels)
         )
-        off = _raw_columns(s, columns[i], _shares(point.parameters, laws))
-        found.append(_with_nuisance(judged.with_noise([noise[c] for c in s.channels]), off))
+        judged = judged.with_noise([noise[c] for c in s.channels])
+        found.append(_with_nuisance(judged, _raw_columns(s, columns[i], shares)))
     return found
 
 
