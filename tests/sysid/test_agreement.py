@@ -10,7 +10,8 @@ import pytest
 
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.diagnosis.search.agreement import AGREED, CONFIRMED, agreed, agreement, sure
+from hydraulic_sysid.diagnosis.search.agreement import agreed, agreement, sure
+from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
 from hydraulic_sysid.diagnosis.search.fitting import Fitting
 from hydraulic_sysid.diagnosis.search.misfit import Misfit
 
@@ -36,7 +37,7 @@ def test_what_each_segment_says_otherwise_is_not() -> None:
     shape = np.ones((SEGMENTS, SAMPLES))
     change = float(np.sum(noise[FIT] * shape[FIT]) / np.sum(shape[FIT] ** 2)) * shape
     gain = float(np.sum(noise[FIT] ** 2) - np.sum((noise - change)[FIT] ** 2))
-    assert gain > AGREED, "white noise would make it sure"
+    assert gain > CRITERIA.agreed, "white noise would make it sure"
     assert not agreed([noise], [noise - change], [FIT])
 
 
@@ -64,7 +65,7 @@ def test_what_was_not_chosen_need_not_stand_out_among_many() -> None:
     noise, shape = white(7), np.sin(0.1 * np.arange(SAMPLES)) * np.ones((SEGMENTS, 1))
     change = 0.07 * shape
     own, size = np.sum(change * (noise + change), axis=1), np.sum(change**2, axis=1)
-    assert 2.0 * CONFIRMED < agreement(own[FIT], size[FIT]) < AGREED
+    assert 2.0 * CRITERIA.confirmed < agreement(own[FIT], size[FIT]) < CRITERIA.agreed
     assert not agreed([noise + change], [noise], [FIT])
     assert sure(own, size, FIT, found=False)
 

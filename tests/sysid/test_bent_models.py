@@ -18,10 +18,11 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import recording_fits, search
 from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
-from hydraulic_sysid.diagnosis.search.data_sheet import PLAUSIBLE, Deviation, priors, relaxed
+from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
+from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, priors, relaxed
 from hydraulic_sysid.diagnosis.search.data_sheet_fits import DataSheetFits
 from hydraulic_sysid.diagnosis.search.drive_faults import costs_with
-from hydraulic_sysid.diagnosis.search.fitting import FAR_OFF, retimed, spiked
+from hydraulic_sysid.diagnosis.search.fitting import retimed, spiked
 from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit, refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
@@ -118,7 +119,7 @@ def test_what_a_model_bends_to_explain_the_same_counts_against_it() -> None:
 def test_sizes_that_are_shares_are_known_beforehand_to_be_small(model: Model) -> None:
     known, scale = priors(model), model.library["sensor_scale"].parameters[0]
     mean, std = known["sensor_scale.scale"]
-    assert (mean, std) == (1.0, pytest.approx(PLAUSIBLE * (scale.default - 1.0)))
+    assert (mean, std) == (1.0, pytest.approx(CRITERIA.plausible * (scale.default - 1.0)))
     assert "sensor_scale.scale" not in priors(model.with_effect("sensor_scale"))  # its file's own
     assert not any(key.startswith(("coulomb_friction.", "hose_compliance.")) for key in known)  # sizes of the plant
 
@@ -204,7 +205,7 @@ def test_what_a_bent_model_hides_shows_beside_the_values_of_its_file(model: Mode
     bent = model.with_values({"moving_mass": 2.0 * model.value("moving_mass")})
     at = Linearisation.of(bent, fits.split)
     base = SearchState(bent, at, misfit(fits.split, at.costs), at.residual)
-    assert base.misfit.variance > FAR_OFF
+    assert base.misfit.variance > CRITERIA.far_off
     found = fits.beside_filed_values(base)
     assert found[0].name == "structural_flexibility"
     assert found[0].refit.model.value("moving_mass") == model.value("moving_mass")

@@ -10,7 +10,8 @@ import pytest
 
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
-from hydraulic_sysid.diagnosis.search.competing_models import ODDS, CompetingModel
+from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
+from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation
 from hydraulic_sysid.diagnosis.search.drift import Drift
 from hydraulic_sysid.diagnosis.search.holdout import Split
@@ -18,7 +19,7 @@ from hydraulic_sysid.diagnosis.search.misfit import Misfit
 from hydraulic_sysid.diagnosis.search.posterior import explanations, probability, sentence
 from hydraulic_sysid.diagnosis.search.remainder import Remainder
 from hydraulic_sysid.diagnosis.search.search_state import SearchResult, SearchState
-from hydraulic_sysid.diagnosis.search.unknown_law import CALIBRATION, probability_of_unknown
+from hydraulic_sysid.diagnosis.search.unknown_law import probability_of_unknown
 from hydraulic_sysid.diagnosis.search.verdict import (
     COMPLETE,
     DATA_SHEET,
@@ -64,18 +65,18 @@ def test_nothing_left_and_no_rival_is_twenty_to_one(model: Model) -> None:
     named, unknown = found
     assert (named.effects, named.named, named.library) == (("valve_deadband",), True, True)
     assert unknown.effects == () and not unknown.named and not unknown.library
-    assert named.probability / unknown.probability == pytest.approx(ODDS)
-    assert probability(found) == pytest.approx(ODDS / (1.0 + ODDS))
+    assert named.probability / unknown.probability == pytest.approx(CRITERIA.odds)
+    assert probability(found) == pytest.approx(CRITERIA.odds / (1.0 + CRITERIA.odds))
     assert sentence(found) == "The probability of this verdict is 95 %."
 
 
 def test_what_is_left_speaks_for_a_law_that_the_library_lacks() -> None:
     levels = [probability_of_unknown(left(4.0), left(after)) for after in (0.98, 1.0, 1.05, 1.5, 3.9)]
-    assert levels[0] == levels[1] == 1.0 / (1.0 + ODDS)
+    assert levels[0] == levels[1] == 1.0 / (1.0 + CRITERIA.odds)
     assert levels[1:] == sorted(levels[1:]) and levels[-1] > 0.9
     # Beside an effect that explains a hundred times as much, its own law leaves some of that.
     assert probability_of_unknown(left(400.0), left(1.05)) < probability_of_unknown(left(4.0), left(1.05))
-    at = replace(CALIBRATION, odds=1.0, missed=0.5, laws=0.0)
+    at = replace(CRITERIA, odds=1.0, unknown_missed=0.5, unknown_laws=0.0)
     assert probability_of_unknown(left(2.0), left(1.5), at) == pytest.approx(2.0 / 3.0)
 
 
@@ -97,7 +98,7 @@ def test_a_tie_is_right_where_one_of_its_names_is(model: Model) -> None:
     named = [e for e in found if e.named]
     assert {e.effects for e in named} == {("sensor_lag",), ("command_delay",)}
     assert named[0].probability == named[1].probability
-    assert 0.94 < cast(float, probability(found)) < ODDS / (1.0 + ODDS)
+    assert 0.94 < cast(float, probability(found)) < CRITERIA.odds / (1.0 + CRITERIA.odds)
 
 
 def test_of_two_effects_one_is_exchanged_at_a_time(model: Model) -> None:
@@ -113,7 +114,7 @@ def test_numbers_that_say_the_same_are_named_together(model: Model) -> None:
     assert {(e.effects, e.numbers) for e in found if e.named} == {
         ((), ("supply_pressure",)), ((), ("tank_pressure",)), (("pressure_offset",), ())
     }  # fmt: skip
-    assert probability(found) == pytest.approx(ODDS / (1.0 + ODDS))
+    assert probability(found) == pytest.approx(CRITERIA.odds / (1.0 + CRITERIA.odds))
 
 
 def test_outside_the_library_is_that_none_of_these_is_right(model: Model) -> None:
@@ -123,7 +124,8 @@ def test_outside_the_library_is_that_none_of_these_is_right(model: Model) -> Non
     little = result(model, 1.2, 1.0)
     assert probability(explanations(little, verdict(OUTSIDE, "constant_load"))) == 0.5, "a law bent to its limits"
     drifting = replace(little, drift=Drift("viscous_friction.coefficient", 300.0, 100.0, 5.0, 0.3, 60.0))
-    assert cast(float, probability(explanations(drifting, verdict(OUTSIDE)))) == pytest.approx(ODDS / (1.0 + ODDS))
+    said = cast(float, probability(explanations(drifting, verdict(OUTSIDE))))
+    assert said == pytest.approx(CRITERIA.odds / (1.0 + CRITERIA.odds))
 
 
 @pytest.mark.parametrize(

@@ -14,16 +14,17 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.profile_likelihood import with_profiles
 from hydraulic_sysid.diagnosis.search.search import Search
-from hydraulic_sysid.diagnosis.search.uncertainty import SHARED, law_share, parameter_errors
+from hydraulic_sysid.diagnosis.search.uncertainty import law_share, parameter_errors
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
 
 DT, NOISE = 1e-3, {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}
 LEAKAGE, FREQUENCY = "internal_leakage.coefficient", "spool_dynamics.frequency"
 FREE = ("bulk_modulus", "viscous_friction.coefficient", LEAKAGE)
-LIMIT = (3.0 * SHARED**2, 7.0 * SHARED**2)  # about the 3.84 of one degree of freedom, of so few segments, and shared
+LIMIT = (3.0 * CRITERIA.shared**2, 7.0 * CRITERIA.shared**2)  # about the 3.84 of one degree of freedom, and shared
 
 
 def fitted(built: Model, free: tuple[str, ...], seed: int = 3, louder: float = 1.0) -> Linearisation:

@@ -12,9 +12,10 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
 from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import SearchState
-from hydraulic_sysid.diagnosis.search.worth import NOTHING_LEFT, borrowed
+from hydraulic_sysid.diagnosis.search.worth import borrowed
 from hydraulic_sysid.estimation.fit import FitSettings
 
 DT, SECONDS = 1e-3, 12.0
@@ -46,7 +47,7 @@ def test_what_passes_for_noise_is_still_promised_by_its_effect(model: Model, hid
         plant = plant.with_effect(name, values)
     looked = search(model, plant)
     base = looked.judged(looked.state(looked.given))
-    assert base.misfit.variance - 1.0 < NOTHING_LEFT, "by the noise alone nothing is left of either"
+    assert base.misfit.variance - 1.0 < CRITERIA.nothing_left, "by the noise alone nothing is left of either"
     assert looked.nothing_left(base) is nothing
 
 

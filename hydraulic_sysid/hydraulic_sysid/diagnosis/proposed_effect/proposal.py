@@ -22,6 +22,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.display import percent
 from hydraulic_sysid.diagnosis.search.candidates import subsystem
+from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
 from hydraulic_sysid.diagnosis.search.diagnosis import Remaining
 from hydraulic_sysid.diagnosis.search.force_balance import drives_by_force
 from hydraulic_sysid.diagnosis.search.force_curves import ForceCurve, Forces
@@ -37,7 +38,6 @@ from hydraulic_sysid.diagnosis.search.nonparametric_curves import (
     places_with_memory,
     unexplained,
 )
-from hydraulic_sysid.diagnosis.search.score_test import ENOUGH
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parameters import Priors
@@ -236,7 +236,7 @@ def _candidates(
 
 def _with_memory(part: Linearisation, say: Callable[[str], None]) -> Candidate | None:
     """The best place for a curve that remembers."""
-    sample, _ = part.sample(ENOUGH)
+    sample, _ = part.sample(CRITERIA.enough_to_score)
     rough = [(curve(sample, place), place) for place in places_with_memory(sample, _lags(part, LAGS), say)]
     found = [(c.reduction, number) for number, (c, _) in enumerate(rough) if c is not None]
     return _candidate(part, rough[max(found)[1]][1], FINE) if found else None

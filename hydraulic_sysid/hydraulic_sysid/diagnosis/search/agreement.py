@@ -14,8 +14,7 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array, Mask
 
-AGREED = 50.0  # squared size over its variance on segments for fitting, …
-CONFIRMED = 10.0  # … and on those for validation: chance and wrong noise gave 44 and less, effects 80 and more
+from .criteria import CRITERIA
 
 
 def agreed(before: Sequence[Array], after: Sequence[Array], fit: Sequence[Mask]) -> bool:
@@ -34,8 +33,8 @@ def sure(own: Array, size: Array, fitted: Mask, found: bool = True) -> bool:
     :param fitted: (S,) which were
     :param found: it is the best of many, fitted to them; else nothing was chosen, and chance has one try
     """
-    confirmed = fitted.all() or agreement(own[~fitted], size[~fitted]) > CONFIRMED
-    return bool(agreement(own[fitted], size[fitted]) > (AGREED if found else CONFIRMED) and confirmed)
+    confirmed = fitted.all() or agreement(own[~fitted], size[~fitted]) > CRITERIA.confirmed
+    return bool(agreement(own[fitted], size[fitted]) > (CRITERIA.agreed if found else CRITERIA.confirmed) and confirmed)
 
 
 def agreement(own: Array, size: Array) -> float:

@@ -12,23 +12,15 @@ from hydraulic_sysid.estimation.parallel import results
 
 from .candidate_table import candidate_table
 from .candidates import candidates, delays, observed, subsystem
-from .fitting import ENOUGH, FAR_OFF, Fitting, Task, differentiable, with_fitted_values, without_derivative
+from .criteria import CRITERIA
+from .fitting import Fitting, Task, differentiable, with_fitted_values, without_derivative
 from .frozen_jacobian import Refit, refit, refit_rounded
 from .linearisation import Linearisation
 from .misfit import misfit
 from .score_test import CandidateScore, score
 from .search_state import CandidateRefit, SearchState
 from .spectral_lines import record_features
-from .worth import ELSEWHERE, FAR, NOTHING_LEFT, Enough
-
-PROMISING = 0.04  # of the best predicted reduction, from which a candidate is refitted
-MOST_REFITS = 8
-LATER_REFITS = 4  # once something was added, …
-ALIKE = 2  # … of one subsystem: what its laws left makes all of its effects look promising
-FULL = 2  # candidates that are refitted from more than one start, and with all sensitivities taken anew
-OTHERS = 3  # further candidates, that are set against the nearest where a quick refit is no sure guide
-NEAR = 0.93  # of the best reduction, from which a refit is finished
-PROMISED = 0.5  # of what an effect must explain, or of what a number explains, which must show for a fit to its end
+from .worth import Enough
 
 T = TypeVar("T")
 
@@ -58,7 +50,7 @@ class CandidateFits(Fitting):
         sensitivities alone often falls far short of what a fit gains (47 of 980, for a little air in the oil), so no
         more is asked than would count at all. A quick search leaves that out.
         """
-        nothing = state.misfit.variance - 1.0 < NOTHING_LEFT
+        nothing = state.misfit.variance - 1.0 < CRITERIA.nothing_left
         if self.quick or not nothing:
             return nothing
         self.say("looking for what may pass for noise")
@@ -68,16 +60,17 @@ class CandidateFits(Fitting):
         """Whether an effect only delays, by less than a sampling interval: sound sensors and loggers do so, too."""
         return delays(self.given.library[tried.name], tried.refit.model.value, self.split.interval)
 
-    def explore(self, base: SearchState, most: int = MOST_REFITS, anew: bool = True) -> SearchState:
+    def explore(self, base: SearchState, most: int = CRITERIA.most_refits, anew: bool = True) -> SearchState:
         """Score all candidates on a state and refit the best; not ``anew``: by the scores beside the same effects."""
         at = base.linearisation
         known = None if anew else self._seen.get(frozenset(base.model.effects))
         scores = self.scores(base) if known is None else known
         if not scores:
             return base
-        least = max(PROMISING * scores[0].reduction, 0.2 * base.misfit.least)
+        least = max(CRITERIA.promising * scores[0].reduction, CRITERIA.perhaps * base.misfit.least)
         worth = [s for s in scores if s.reduction > least and not observed(s.effect)]
-        best = varied(worth, [s.effect for s in worth], ALIKE if most < MOST_REFITS else most)[:most]
+        alike = CRITERIA.most_alike if most < CRITERIA.most_refits else most
+        best = varied(worth, [s.effect for s in worth], alike)[:most]
         # What rounding explains shows once the initial states have settled with it.
         best += [s for s in scores if observed(s.effect)]
         every: list[CandidateRefit] = []
@@ -107,7 +100,7 @@ class CandidateFits(Fitting):
         self.say.watch({"candidates": candidate_table(base, scores, refits, self._added(base.model))})
 
     def refitted(
-        self, base: SearchState, chosen: Sequence[CandidateScore], full: int = FULL
+        self, base: SearchState, chosen: Sequence[CandidateScore], full: int = CRITERIA.most_finished
     ) -> Iterator[CandidateRefit]:
         """Candidates refitted on a state, in their order; the first of them from all of their starts."""
         _ = base.linearisation.columns, base.linearisation.normal  # once, for all that work at the same time
@@ -119,7 +112,7 @@ class CandidateFits(Fitting):
     def _refit_from(self, base: SearchState, candidate: CandidateScore, others: bool) -> CandidateRefit:
         found = self.refit(base, candidate)
         for start in candidate.others if others else ():
-            if found.misfit.excess > (1.0 - NEAR) * base.misfit.excess:
+            if found.misfit.excess > (1.0 - CRITERIA.near) * base.misfit.excess:
                 again = self.refit(base, replace(candidate, start=start))
                 found = min(found, again, key=lambda r: r.misfit.total)
         return found
@@ -132,7 +125,7 @@ class CandidateFits(Fitting):
             done = refit_rounded(at, with_fitted_values(base.model.with_effect(name), done.model))
         return CandidateRefit(name, done, misfit(self.split, done.costs, self.prior_cost(done.model)))
 
-    def finish(self, base: SearchState, enough: Enough, promised: float = PROMISED) -> SearchState | None:
+    def finish(self, base: SearchState, enough: Enough, promised: float = CRITERIA.promised) -> SearchState | None:
         """The best of the refits, fitted to the end; None where none is worth it.
 
         ``enough(name, misfit, part)``: whether an effect's misfit is a part of the way to being worth it.
@@ -145,8 +138,9 @@ class CandidateFits(Fitting):
         if not worth:
             return None
         top = base.misfit.total - worth[0].misfit.total
-        near = [r for r in worth if base.misfit.total - r.misfit.total >= NEAR * top]
-        near = [r for r in near if r.misfit.excess <= FAR * worth[0].misfit.excess + r.misfit.least][: FULL + OTHERS]
+        near = [r for r in worth if base.misfit.total - r.misfit.total >= CRITERIA.near * top]
+        near = [r for r in near if r.misfit.excess <= CRITERIA.far * worth[0].misfit.excess + r.misfit.least]
+        near = near[: CRITERIA.most_finished + CRITERIA.most_others]
         found = []
         for tried in self.set_against_others(base, near):
             self.say(f"fitting with {tried.name}")
@@ -167,7 +161,7 @@ class CandidateFits(Fitting):
         A parameter is worth what BIC gives it, or what the laws of effects found before may leave for others.
         """
         found = max(self.path[0].misfit.total - self.path[-1].misfit.total, 0.0) if self.path else 0.0
-        each = max(state.misfit.freedom, ELSEWHERE * found)
+        each = max(state.misfit.freedom, CRITERIA.law_elsewhere * found)
         return state.misfit.total + len(state.linearisation.parameters) * each
 
     def set_against_others(self, base: SearchState, near: Sequence[CandidateRefit]) -> list[CandidateRefit]:
@@ -180,18 +174,18 @@ class CandidateFits(Fitting):
         """
         bent = any("." not in key and key in self.priors for key in base.linearisation.parameters.at_bound)
         every = list(near)
-        if bent or near[0].misfit.excess > (1.0 - NEAR) * base.misfit.excess:
+        if bent or near[0].misfit.excess > (1.0 - CRITERIA.near) * base.misfit.excess:
             names = {r.name for r in near}
             others = [*near, *(r for r in base.refits if r.name not in names)]
-            others = varied(others, [base.model.library[r.name] for r in others], ALIKE)
-            every += [r for r in others if r.name not in names][:OTHERS]
-            every += self.beside_filed_values(base) if base.misfit.variance >= FAR_OFF else []
-        if len(every) <= FULL and len(every) == len(near):
+            others = varied(others, [base.model.library[r.name] for r in others], CRITERIA.most_alike)
+            every += [r for r in others if r.name not in names][: CRITERIA.most_others]
+            every += self.beside_filed_values(base) if base.misfit.variance >= CRITERIA.far_off else []
+        if len(every) <= CRITERIA.most_finished and len(every) == len(near):
             return every
         # What the records show by themselves has nothing to be fitted.
         seen = [r for r in near if observed(base.model.library[r.name])]
         every = [r for r in every if not observed(base.model.library[r.name])]
-        found, few = [], self.split.some(ENOUGH)
+        found, few = [], self.split.some(CRITERIA.enough_to_fit)
         for r in every:
             self.say(f"setting {r.name} against others")
             try:
@@ -203,11 +197,12 @@ class CandidateFits(Fitting):
         best: dict[str, tuple[float, CandidateRefit]] = {}
         for cost, r in sorted(found, key=lambda pair: pair[0]):
             best.setdefault(r.name, (cost, r))
-        ranked = list(best.values())[:FULL]
+        ranked = list(best.values())[: CRITERIA.most_finished]
         noise = sum(int(s.counted.sum()) for s in few)
         excess = [max(cost - noise, 0.0) for cost, _ in ranked]
-        near = [r for own, (_, r) in zip(excess, ranked, strict=True) if own <= FAR * excess[0] + base.misfit.least]
-        return [*seen, *near] or every[:FULL]
+        most = CRITERIA.far * excess[0] + base.misfit.least
+        near = [r for own, (_, r) in zip(excess, ranked, strict=True) if own <= most]
+        return [*seen, *near] or every[: CRITERIA.most_finished]
 
     def beside_filed_values(self, base: SearchState) -> list[CandidateRefit]:
         """The best candidates on the model as its file has it, not refitted yet."""
@@ -217,7 +212,7 @@ class CandidateFits(Fitting):
         except SimulationError:  # what was added beside it does not run with them
             return []
         scores = [s for s in score(at, candidates(filed), record_features(at)) if not observed(s.effect)]
-        best = varied(scores, [s.effect for s in scores], ALIKE)[:OTHERS]
+        best = varied(scores, [s.effect for s in scores], CRITERIA.most_alike)[: CRITERIA.most_others]
         models = [filed.with_effect(s.effect.name).with_values(s.start) for s in best]
         return [CandidateRefit(s.effect.name, Refit(m, []), base.misfit) for s, m in zip(best, models, strict=True)]
 

@@ -10,15 +10,12 @@ from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 
+from .criteria import CRITERIA
 from .linearisation import Linearisation
 from .misfit import Misfit
 from .search_state import SearchState
 
-ODDS = 20.0  # from which two models are told apart, …
-DISTINCT = 30.0  # … which this difference of the sums of squares gives, of the variance, …
-LAW = 0.05  # … beside this share of what the better one leaves: no law is quite that of the bench
 _MOST = 5
-_MOST_POWER = 3.0  # of `ODDS`, up to which odds are counted: a fit may have stopped short
 
 
 @dataclass(frozen=True)
@@ -39,13 +36,13 @@ class CompetingModel:
     @property
     def distinguishable(self) -> bool:
         """Whether the data decide against it."""
-        return self.odds > ODDS
+        return self.odds > CRITERIA.odds
 
 
 def odds(misfit: Misfit, difference: float) -> float:
     """Of a model that leaves ``misfit`` against one that leaves this ``difference`` more of the sum of squares."""
-    needed = DISTINCT * misfit.variance + LAW * misfit.excess
-    return float(ODDS ** np.clip(difference / needed, -_MOST_POWER, _MOST_POWER))
+    needed = CRITERIA.distinct * misfit.variance + CRITERIA.law_of_the_better * misfit.excess
+    return float(CRITERIA.odds ** np.clip(difference / needed, -CRITERIA.most_power, CRITERIA.most_power))
 
 
 def competing_models(name: str, without: SearchState, final: Misfit) -> list[CompetingModel]:

@@ -20,6 +20,7 @@ from hydraulic_sysid.estimation.covariance import inverse
 from hydraulic_sysid.estimation.parameters import Priors
 
 from .candidates import inverse as inverse_to
+from .criteria import CRITERIA
 from .linearisation import Linearisation
 from .uncertainty import Known
 
@@ -28,10 +29,6 @@ TOLERANCES = {"Pa": 0.06, "m^2": 0.04, "m^3": 0.5, "kg": 1.0, "m^3/s": 1.0}
 LEAST_PRESSURE = 1e5  # Pa, of a tank pressure near 0
 NAMED = ("piston_area_a", "piston_area_b", "dead_volume_a", "dead_volume_b", "supply_pressure", "tank_pressure")
 """Base parameters that a data sheet states and a diagnosis leaves as they are."""
-SIGNIFICANT = 25.0  # reduction of the sum of squares, of the variance, for which a number is named …
-PLAUSIBLE = 3.0  # times an effect's default size: a standard deviation of its size
-ROUGH = 0.02  # of what numbers explain: what a prediction that far may be off
-VISIBLE = 0.01  # … at least this share of the number of residuals
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ def priors(given: Model) -> Priors:
     for effect in given.library.values():
         for p in () if effect.name in given.effects else effect.parameters:
             if p.unit == "1" and p.null not in (None, p.default) and not inverse_to(p.null, p.default):
-                found[f"{effect.name}.{p.name}"] = (p.null, PLAUSIBLE * abs(p.default - p.null))
+                found[f"{effect.name}.{p.name}"] = (p.null, CRITERIA.plausible * abs(p.default - p.null))
     for key in loose.free_keys():
         own = given.entries.get(key)
         if "." not in key and own is not None and own.value > 0.0:
@@ -196,7 +193,7 @@ class HeldNumbers:
         others = [k for k in moved if k != key]
         swapped = [(*others, other) for other in self.keys if other not in moved]
         least = self.cost(moved)
-        near = [s for s in swapped if self.cost(s) - least < max(enough, ROUGH * (self.cost(others) - least))]
+        near = [s for s in swapped if self.cost(s) - least < max(enough, CRITERIA.rough * (self.cost(others) - least))]
         return sorted(near, key=self.cost)
 
 
@@ -207,7 +204,7 @@ def significant(cost: float, count: int, variance: float) -> bool:
 
 def least_cost(count: int, variance: float) -> float:
     """The smallest reduction of the sum of squares of ``count`` values for which a number is named."""
-    return max(SIGNIFICANT, VISIBLE * count) * variance
+    return max(CRITERIA.significant, CRITERIA.number_visible * count) * variance
 
 
 def _nearest(given: Model, key: str, value: float) -> float:

@@ -14,21 +14,16 @@ import numpy as np
 
 from hydraulic_sim.errors import SimulationError
 
-from .candidate_fits import FULL, LATER_REFITS, PROMISED, CandidateFits
+from .candidate_fits import CandidateFits
+from .criteria import CRITERIA
 from .data_sheet import Deviation, HeldNumbers, least_cost, relaxed, restored, stretched, with_error
-from .fitting import FAR_OFF, worse
+from .fitting import worse
 from .misfit import explained, reduction
 from .number_sets import sets_of_one_effect
 from .search_state import SearchResult, SearchState
 from .spectral_lines import record_features
 from .uncertainty import parameter_errors
-from .worth import FURTHER, PROMISES, nothing_gained
-
-WORSE_LOOK = 0.2  # share by which a look at few segments leaves them more: the fit leads to something worse
-SUSPECTS = 2  # numbers of the data sheet that are tried in the place of one, …
-GUESSED = 4  # … unless more than so many are others: then the sheet is a guess, and none can be told from the rest
-MOST_SETS = 2  # of numbers in whose place one effect is tried
-CLEAR = 10.0  # times what names a number, beyond which a fit need not show what keeping it costs
+from .worth import nothing_gained
 
 
 class DataSheetFits(CandidateFits):
@@ -46,7 +41,7 @@ class DataSheetFits(CandidateFits):
         self.say("fitting the model within the tolerances of its data sheet")
         # What lies at its bound may be far beyond it, and where much is left so may be what stopped short of it.
         at_bound = strict.linearisation.parameters.at_bound
-        far = strict.misfit.variance >= FAR_OFF or any(key in at_bound for key in stretched(self.given))
+        far = strict.misfit.variance >= CRITERIA.far_off or any(key in at_bound for key in stretched(self.given))
         try:
             # What is far off is bent to imitate what it lacks: the model file's values are nearer to the truth.
             model = relaxed(self.with_filed_values(strict.model) if far else strict.model)
@@ -54,7 +49,7 @@ class DataSheetFits(CandidateFits):
             loose = self.nearer(model, far)
         except SimulationError:  # it went where the plant does not run
             return None
-        helps = self.better(strict, loose) and explained(strict.misfit, loose.misfit) > FURTHER
+        helps = self.better(strict, loose) and explained(strict.misfit, loose.misfit) > CRITERIA.further
         return loose if helps else None
 
     def concluded(self, found: SearchResult, others: bool = True) -> SearchResult:
@@ -78,7 +73,7 @@ class DataSheetFits(CandidateFits):
             best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
             # All numbers together may do what an effect does, too.
             nearest = min((done, final), key=lambda s: s.misfit.total)
-            clear = nearest.misfit.total - best.misfit.total > PROMISES * nearest.misfit.least
+            clear = nearest.misfit.total - best.misfit.total > CRITERIA.promises * nearest.misfit.least
             if clear and self.better(nearest, best) and not nothing_gained(nearest.misfit, best.misfit):
                 name = new_effect(best, strict)
                 return replace(
@@ -106,7 +101,7 @@ class DataSheetFits(CandidateFits):
         self.say("looking for one effect that does what several numbers do")
         at = done.linearisation
         nominal = {d.key: d.nominal for d in moved}
-        return sets_of_one_effect(at, nominal, record_features(at), done.misfit.freedom)[:MOST_SETS]
+        return sets_of_one_effect(at, nominal, record_features(at), done.misfit.freedom)[: CRITERIA.most_sets]
 
     def simpler(
         self,
@@ -146,21 +141,21 @@ class DataSheetFits(CandidateFits):
         held = HeldNumbers.of(final.linearisation, self.given)
         enough = least_cost(final.misfit.count, final.misfit.variance)
         # Far from the file's values the quadratic says little: the data sheet as it is comes first, fitted.
-        for moved in chain([()], filter(None, held.fewest(enough, CLEAR * enough))):
+        for moved in chain([()], filter(None, held.fewest(enough, CRITERIA.clear * enough))):
             done = strict if strict is not None and not moved else self.with_moved(final, moved)
             if done.misfit.total - final.misfit.total <= enough:
                 break
         for key in moved:
             # Another number may say the same, or what a fit gained came from the others, which had stopped short.
-            if held.deviation(key, moved, done.model.value(key)).cost < CLEAR * enough:
+            if held.deviation(key, moved, done.model.value(key)).cost < CRITERIA.clear * enough:
                 others = tuple(k for k in moved if k != key)
                 back = self.with_moved(done, others)
                 if back.misfit.total - done.misfit.total <= enough:
                     moved, done = others, back
-        found = []
+        found, most = [], CRITERIA.most_suspects if len(moved) <= CRITERIA.guessed else 0
         for key in moved:
             same = []
-            for tied in held.instead(key, moved, enough)[: SUSPECTS if len(moved) <= GUESSED else 0]:
+            for tied in held.instead(key, moved, enough)[:most]:
                 state = self.with_moved(final, tied)
                 if not worse(state.misfit, done.misfit):
                     same.append(self.deviation(held, tied[-1], tied, state))
@@ -185,10 +180,10 @@ class DataSheetFits(CandidateFits):
         """
         others = [d.key for d in moved if d not in taken]
         back = self.with_moved(done, others) if others or strict is None else strict
-        without = self.explore(back, LATER_REFITS)
-        promising = without.misfit.total - PROMISED * (without.misfit.total - done.misfit.total)
-        found, near = [], [r for r in without.refits if r.misfit.total < promising][:FULL]
-        most = (1.0 + WORSE_LOOK) * self.left_on_few(done) if near else 0.0
+        without = self.explore(back, CRITERIA.later_refits)
+        promising = without.misfit.total - CRITERIA.promised * (without.misfit.total - done.misfit.total)
+        found, near = [], [r for r in without.refits if r.misfit.total < promising][: CRITERIA.most_finished]
+        most = (1.0 + CRITERIA.worse_look) * self.left_on_few(done) if near else 0.0
         for r in near:
             own = {p.name: r.refit.model.value(f"{r.name}.{p.name}") for p in r.refit.model.library[r.name].parameters}
             self.say(f"{r.name} in the place of {' and '.join(d.key for d in taken)}")

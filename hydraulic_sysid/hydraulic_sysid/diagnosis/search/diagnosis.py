@@ -18,6 +18,7 @@ from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locat
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
+from .criteria import CRITERIA
 from .data_sheet import as_filed
 from .document import document, with_balances
 from .linearisation import Linearisation
@@ -27,7 +28,6 @@ from .progress import Watch
 from .search import Search
 from .search_state import SearchResult
 from .uncertainty import Known
-from .worth import HOPELESS
 
 BALANCED = 40.0  # s of all records together of which balances are formed where they are not attributed, …
 SHORT = 4.0  # … and at least of each
@@ -108,10 +108,10 @@ def diagnose(
         verdict = verdicts.judge(found)
         outside = verdict.kind == verdicts.OUTSIDE
         # Where most is left, what was added is a proxy for something else, and bends curves and balances.
-        proxy = explained(found.base.misfit, found.final.misfit) < HOPELESS
+        proxy = explained(found.base.misfit, found.final.misfit) < CRITERIA.hopeless
         suspect = found.base if proxy else found.final
         curves: list[NonparametricCurve] = []
-        much = found.final.misfit.usual > verdicts.RIGHT and not (found.by_force or found.stopped)
+        much = found.final.misfit.usual > CRITERIA.right_law and not (found.by_force or found.stopped)
         if outside or (found.added and much):
             curves = search.curves(suspect, say)
             verdict = verdicts.reviewed(verdict, found, curves)
@@ -136,7 +136,7 @@ def diagnose(
             competing["+".join(tied)] = done
         before, after = found.base.model, found.final.model if found.added or found.moved else None
         # A change along the records and a curve that shows a law say by themselves where it is.
-        shown = verdicts.drifting_effect(found) is not None or any(c.share > verdicts.UNATTRIBUTED for c in curves)
+        shown = verdicts.drifting_effect(found) is not None or any(c.share > CRITERIA.unattributed for c in curves)
         asked = outside and not shown
         suspected = None if not asked else before if proxy else after
         del found, suspect  # their sensitivities would take up the memory that the balances need

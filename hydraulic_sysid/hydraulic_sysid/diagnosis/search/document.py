@@ -13,9 +13,10 @@ from hydraulic_sysid.diagnosis.compare.subject import model_document
 from . import posterior
 from . import verdict as verdicts
 from .candidates import subsystem
+from .criteria import CRITERIA
 from .data_sheet import Deviation
 from .holdout import BLOCK, EVERY
-from .misfit import UNSEEN, Misfit
+from .misfit import Misfit
 from .nonparametric_curves import NonparametricCurve
 from .recording_faults import RecordingFault
 from .search_state import SearchResult
@@ -41,7 +42,7 @@ def document(
     records["test"] = result.split.tested()
     imitations = verdicts.imitated([r for every in records.values() for r in every])
     outside = verdict.kind == OUTSIDE
-    explained = final.misfit.variance <= 1.0 + 2.0 * UNSEEN
+    explained = final.misfit.variance <= 1.0 + 2.0 * CRITERIA.noise_missed
     compared = posterior.explanations(result, verdict)
     said = [verdicts.sentences(result, verdict, curves), "" if tested is None else tested.text]
     text = " ".join(filter(None, [*said, posterior.sentence(compared)]))

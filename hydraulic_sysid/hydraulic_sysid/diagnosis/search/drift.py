@@ -16,12 +16,11 @@ from hydraulic_sim.arrays import Array, Index, Mask
 from hydraulic_sysid.estimation.refinement import LAW
 
 from .agreement import agreement, sure
+from .criteria import CRITERIA
 from .linearisation import Linearisation
 from .misfit import but_the_worst
 
 LEAST = LAW * 12.0**0.5  # of a parameter over a record: then its root mean square is what a law may be off anyway
-RECORDS = 3  # that agree on a smaller change, of no less than a law may be off, …
-AGREE = 20.0  # … with a squared size over its variance of more than this
 
 
 @dataclass(frozen=True)
@@ -86,6 +85,7 @@ def steady(own: Array, size: Array, fitted: Mask, records: Index) -> bool:
     off = np.abs(own - size * own.sum() / max(float(size.sum()), np.finfo(float).tiny))
     kept = but_the_worst(off, np.ones(off.size))
     in_records = [np.bincount(records[kept], weights=x[kept]).astype(float) for x in (own, size)]
-    if np.count_nonzero(in_records[1]) < RECORDS or agreement(in_records[0], in_records[1]) < AGREE:
+    few = np.count_nonzero(in_records[1]) < CRITERIA.agreeing_records
+    if few or agreement(in_records[0], in_records[1]) < CRITERIA.records_agree:
         return False
     return sure(own[kept], size[kept], fitted[kept])

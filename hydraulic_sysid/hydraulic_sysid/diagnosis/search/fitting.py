@@ -24,31 +24,15 @@ from hydraulic_sysid.estimation.segments import Segments, shorter
 
 from .agreement import agreed, sure
 from .candidates import observed
+from .criteria import CRITERIA
 from .data_sheet import priors, significant
 from .errors import DiagnosisError
 from .frozen_jacobian import refit_rounded
 from .holdout import Split, split
 from .linearisation import Linearisation
-from .misfit import SIGNIFICANT, Misfit, material, misfit
+from .misfit import Misfit, material, misfit
 from .progress import Progress, Watch
 from .search_state import SearchState, loud
-from .worth import EXPLAINED, NOTHING_LEFT
-
-ENOUGH = 60  # segments, spread over all records, that do for a first fit
-FEW_STEPS = 6  # of a fit to those that only sets effects against each other, at most, …
-FEW_GAIN = 2e-3  # … and while a step lowers the sum of squares by this share
-LOOK = 20  # segments, spread over all records, that show where a fit from other values leads, …
-SAME_LOOK = 0.02  # … where what noise does not explain falls by no more than this share: nowhere else
-FINE_LOOK = 0.2  # of what must be gained there: steps that gain less end such a fit
-SHORTER = 4  # times: segments from which a fit that is far off begins once more
-FIRST_GAIN = 0.02  # share of the sum of squares that a step must gain while the noise is not known yet
-BEYOND = 8  # values of a number that lay at its bound, over all where it may go, from which a fit may begin
-QUIETER = 0.95  # of the noise before: what was judged by that is judged again
-RETIMED = 0.03  # sampling intervals by which a channel is less late than before: the same
-FAR_OFF = 4.0  # mean square over noise from which a fit need not be finished
-ROUNDS = 6  # of estimating noise and delays and fitting again, at most
-LAST_STEPS = 8  # of a fit that begins where a quick refit ended, at most, …
-LAST_GAIN = 5e-5  # … and while a step lowers the sum of squares by this share
 
 Say = Callable[[str], None]
 F = TypeVar("F", bound="Fitting")
@@ -77,9 +61,9 @@ class Fitting:
         """The model and what it became with each effect added, as far as the search has come."""
         self.priors = priors(task.given)
         self._starts: dict[frozenset[str], KnownStarts] = {}
-        self._first = replace(task.settings, least_gain=FIRST_GAIN)
-        self._few = replace(task.settings, most_steps=FEW_STEPS, least_gain=FEW_GAIN)
-        self._last = replace(task.settings, most_steps=LAST_STEPS, least_gain=LAST_GAIN)
+        self._first = replace(task.settings, least_gain=CRITERIA.first_gain)
+        self._few = replace(task.settings, most_steps=CRITERIA.few_steps, least_gain=CRITERIA.few_gain)
+        self._last = replace(task.settings, most_steps=CRITERIA.last_steps, least_gain=CRITERIA.last_gain)
 
     @classmethod
     def of(
@@ -101,7 +85,7 @@ class Fitting:
         length = settings.seconds(model, [*records, *validation])
         try:
             cuts = split(records, validation, model, length, quick, test)
-            quarter = shorter(length, SHORTER, [*records, *validation])
+            quarter = shorter(length, CRITERIA.shorter, [*records, *validation])
             short = cache(partial(split, records, validation, model, quarter, quick))
             progress = Progress(say, within, watch or (lambda _: None))
             return cls(Task(model, cuts, short, replace(settings, length=length), progress, quick))
@@ -111,14 +95,14 @@ class Fitting:
     def state(self, model: Model, settings: FitSettings | None = None) -> SearchState:
         """Fit a model and linearise it."""
         smooth = differentiable(model)
-        segments = self.split.some(ENOUGH) if settings is self._first else self.split.to_fit
+        segments = self.split.some(CRITERIA.enough_to_fit) if settings is self._first else self.split.to_fit
         done = self.fitted_to(segments, smooth, settings or self.settings)
         starts = KnownStarts(self.starts(smooth))
         self._starts.pop(frozenset(smooth.effects), None)
         starts.keep(segments, done.point.initial_states)
         at = Linearisation.of(smooth.with_values(done.values, source="fitted"), self.split, self.priors, starts)
         left = misfit(self.split, at.costs, at.parameters.prior_cost)
-        if left.variance < FAR_OFF:  # else they are bent to what the model lacks
+        if left.variance < CRITERIA.far_off:  # else they are bent to what the model lacks
             starts.keep(self.split.segments, at.point.initial_states)
             self._starts[frozenset(smooth.effects)] = starts
         if smooth is model:
@@ -156,7 +140,7 @@ class Fitting:
     def starts(self, smooth: Model) -> KnownStarts | None:
         """Initial states that were fitted with a model's effects, or with the most of them and no others.
 
-        Those of models that are not `FAR_OFF`.
+        Those of models that are not `Criteria.far_off`.
         """
         effects = frozenset(smooth.effects)
         known = [own for own in self._starts if own <= effects]
@@ -172,19 +156,19 @@ class Fitting:
         Where something is missing, delays may go to and fro: they are asked again while that lowers what is left.
         """
         back, left = False, np.inf
-        for number in range(ROUNDS):
+        for number in range(CRITERIA.most_judged):
             self.say("noise of the records")
             at, before = state.linearisation, self.split
             segments = refined(at.point, at.columns, self._laws(state.model))
             after = before.judged(segments, ordinary(at.point, segments))
             # What is far off says little of the noise, however often it is asked.
-            far = state.misfit.variance >= FAR_OFF
+            far = state.misfit.variance >= CRITERIA.far_off
             more = len(after) > len(before)  # segments that are back are judged once more
             again = quieter(before, after) or (retimed(before, after) and state.misfit.variance < left)
             if number and not (back or more) and (far or not again):
                 break
             self.split, back, left = after, more, state.misfit.variance
-            state = self.state(state.model, self._last if state.misfit.variance < FAR_OFF else self._first)
+            state = self.state(state.model, self._last if state.misfit.variance < CRITERIA.far_off else self._first)
         return state
 
     def _laws(self, model: Model) -> list[str]:
@@ -213,14 +197,14 @@ class Fitting:
         lead: over few periods a wrong frequency is hardly a wrong phase.
         """
         found = self.state(model, self._first if far else self._last)
-        if found.misfit.variance - 1.0 < EXPLAINED:
+        if found.misfit.variance - 1.0 < CRITERIA.explained:
             return found
         best = found
         with suppress(SimulationError):  # they lead where the plant does not run
             values = self.fitted_to_short_segments(model)
             if self.leads_elsewhere(values, found):
                 best = min(found, self.state(values, self._first), key=lambda s: s.misfit.total)
-        done = best.misfit.variance >= FAR_OFF or (best is found and not far)
+        done = best.misfit.variance >= CRITERIA.far_off or (best is found and not far)
         return best if done else self.state(best.model, self._last)
 
     def begun_beyond(self, model: Model, keys: Sequence[str]) -> Model:
@@ -230,12 +214,12 @@ class Fitting:
         """
         if not keys:
             return model
-        smooth, short = differentiable(model), self.short().some(ENOUGH)
+        smooth, short = differentiable(model), self.short().some(CRITERIA.enough_to_fit)
         for key in keys:
             now = smooth.value(key)
             low, high = smooth.entry(key).bounds or (now, now)
             costs = {}
-            for value in [now, *np.linspace(low, high, BEYOND).tolist()]:
+            for value in [now, *np.linspace(low, high, CRITERIA.beyond_bound).tolist()]:
                 try:
                     plant = Plant.for_fits(smooth.with_values({key: value}))
                     costs[value] = FitPoint.begin(plant, short, smooth.movable_keys(), priors=self.priors).cost
@@ -250,7 +234,7 @@ class Fitting:
         A model that lacks an effect is bent to imitate it, often up to bounds, and once the effect is there a fit from
         such values may end in a local minimum.
         """
-        if state.misfit.variance - 1.0 < NOTHING_LEFT:
+        if state.misfit.variance - 1.0 < CRITERIA.nothing_left:
             return state
         filed = self.with_filed_values(state.model)
         try:
@@ -263,7 +247,7 @@ class Fitting:
 
     def fitted_to_short_segments(self, model: Model) -> Model:
         """The model with what a first fit to segments a quarter as long gives."""
-        done = self.fitted_to(self.short().some(SHORTER * ENOUGH), model, self._first)
+        done = self.fitted_to(self.short().some(CRITERIA.shorter * CRITERIA.enough_to_fit), model, self._first)
         return model.with_values(done.values)
 
     def leads_elsewhere(self, model: Model, state: SearchState) -> bool:
@@ -272,21 +256,21 @@ class Fitting:
         That is less by a share of what noise does not explain, and by more than a fit to these segments alone gains.
         """
         before = self.left_on_few(state)
-        values = sum(int(s.counted.sum()) for s in self.split.some(LOOK))
-        needed = SIGNIFICANT * max(1.0, before / values) + SAME_LOOK * max(before - values, 0.0)
+        values = sum(int(s.counted.sum()) for s in self.split.some(CRITERIA.look))
+        needed = CRITERIA.significant * max(1.0, before / values) + CRITERIA.same_look * max(before - values, 0.0)
         if before <= needed:
             return False
-        return before - self.looked_at(model, FINE_LOOK * needed / before) > needed
+        return before - self.looked_at(model, CRITERIA.fine_look * needed / before) > needed
 
     def looked_at(self, model: Model, least_gain: float = 0.0) -> float:
         """What a fit to a few segments leaves of them; it goes on while a step gains that share, or the usual one."""
         settings = replace(self._last, least_gain=max(least_gain, self._last.least_gain))
-        return self.fitted_to(self.split.some(LOOK), model, settings).cost
+        return self.fitted_to(self.split.some(CRITERIA.look), model, settings).cost
 
     def left_on_few(self, state: SearchState) -> float:
         """What a state leaves of the same segments."""
         model = differentiable(state.model)
-        few = self.split.some(LOOK)
+        few = self.split.some(CRITERIA.look)
         keys = model.movable_keys()
         starts = self.starts(model)
         return FitPoint.begin(Plant.for_fits(model), few, keys, priors=self.priors, starts=starts).at_rest().cost
@@ -309,7 +293,7 @@ class Fitting:
 def quieter(before: Split, after: Split) -> bool:
     """Whether the noise of any channel has turned out to be clearly smaller, in all of a record or in parts of it."""
     return any(
-        n < QUIETER * o
+        n < CRITERIA.quieter * o
         for new, old in zip(after.segments, before.segments, strict=True)
         for n, o in zip(loud(new), loud(old), strict=True)
     )
@@ -332,9 +316,9 @@ def retimed(before: Split, after: Split) -> bool:
     changed = dict.fromkeys(after.channels, 0.0)
     for new, old in zip(after.segments, before.segments, strict=True):
         for c, (n, o) in enumerate(zip(new.readings, old.readings, strict=True)):
-            if abs(n.delay - o.delay) > RETIMED * new.record.dt:
+            if abs(n.delay - o.delay) > CRITERIA.retimed * new.record.dt:
                 changed[new.channels[c]] += (n.delay - o.delay) ** 2 * float(new.timing[c])
-    return any(c > SIGNIFICANT for c in changed.values())
+    return any(c > CRITERIA.significant for c in changed.values())
 
 
 def without_derivative(model: Model) -> list[str]:

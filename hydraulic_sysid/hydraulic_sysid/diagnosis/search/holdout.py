@@ -24,6 +24,7 @@ from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.refinement import but_accidents
 from hydraulic_sysid.estimation.segments import MEASURED, Segments, cut, spread
 
+from .criteria import CRITERIA
 from .set_aside import SetAside, set_aside
 
 BLOCK = 3  # segments in a row that have the same role
@@ -35,9 +36,6 @@ QUICK_LEAST = 6_000  # … that hold so many values
 TEST_VALUES = 20_000  # measured values of all segments for a test, spread over what is left to test on
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
-LOPSIDED = 4.0  # times what the values of one role leave beyond the noise, from which the other has seen little of it
-SHOWN = 0.1  # mean square beyond the noise in that role, from which that is no chance
-MUCH = 2.0  # times the median mean square of segments: what leaves more shows what is missing
 
 
 @dataclass(frozen=True)
@@ -108,11 +106,12 @@ class Split:
             return self
         every, fitted = np.concatenate(list(squares)), np.concatenate(self.fit)
         beyond = [max(float(np.mean(every[role])) - 1.0, 0.0) for role in (fitted, ~fitted)]
-        if max(beyond) < LOPSIDED * min(beyond) or max(beyond) < SHOWN:
+        if max(beyond) < CRITERIA.lopsided * min(beyond) or max(beyond) < CRITERIA.lopsided_beyond:
             return self
         fit, number = [], 0
+        most = CRITERIA.much_in_a_segment * float(np.median(every))
         for own, f, both in zip(squares, self.fit, mixed, strict=True):
-            much = np.flatnonzero(own > MUCH * float(np.median(every))) if both else np.zeros(0, dtype=int)
+            much = np.flatnonzero(own > most) if both else np.zeros(0, dtype=int)
             shared = f.copy()
             shared[much] = (number + np.arange(much.size)) % EVERY != 1
             number += much.size

@@ -10,16 +10,8 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array, Index, Mask
 
+from .criteria import CRITERIA
 from .holdout import Split
-
-SIGNIFICANT = 25.0  # reduction of the sum of squares, of the present variance, on segments for fitting …
-CONFIRMED = 10.0  # … and on those for validation
-FEW = 0.02  # of all segments, at least one: so many do not turn a verdict, neither by what they leave nor by their gain
-UNSEEN = 0.015  # mean square beyond the noise that a noise estimated from data may miss
-LITTLE = 1.03  # residual over noise up to which nothing need be missing
-SMALL = 1.2  # mean square over noise that is not far off it
-SMALL_UNEXPLAINED = 0.4  # share of it that effects may leave where little was left before
-VISIBLE = 5e-4  # over all residuals, of their present variance: a smaller one is a matter of laws, not of effects
 
 
 @dataclass(frozen=True)
@@ -99,12 +91,12 @@ class Misfit:
     @property
     def little(self) -> bool:
         """Whether so little is left that nothing need be missing."""
-        return self.usual <= LITTLE**2
+        return self.usual <= CRITERIA.little**2
 
     @property
     def least(self) -> float:
         """The smallest reduction of the sum of squares that counts."""
-        return max(SIGNIFICANT, VISIBLE * self.count) * self.variance
+        return max(CRITERIA.significant, CRITERIA.visible * self.count) * self.variance
 
     @property
     def freedom(self) -> float:
@@ -144,8 +136,8 @@ def material(before: Misfit, after: Misfit) -> bool:
         gains = before.by_segment - after.by_segment
         kept = but_the_worst(after.by_segment, after.counted)
         fit, validation = (float(gains[kept][part[kept]].sum()) for part in (after.fitted, ~after.fitted))
-    held = not before.n_validation or validation > CONFIRMED * before.variance
-    return gain >= before.least and held and fit > SIGNIFICANT * before.variance
+    held = not before.n_validation or validation > CRITERIA.confirmed * before.variance
+    return gain >= before.least and held and fit > CRITERIA.significant * before.variance
 
 
 def reduction(before: Misfit, after: Misfit) -> float:
@@ -169,7 +161,7 @@ def explained(before: Misfit, after: Misfit) -> float:
 
 def unexplained_share(before: Misfit, after: Misfit) -> float:
     """Mean square that is surely beyond the noise, over that before (0…1)."""
-    first, last = (max(m.usual - 1.0 - UNSEEN, 0.0) for m in (before, after))
+    first, last = (max(m.usual - 1.0 - CRITERIA.noise_missed, 0.0) for m in (before, after))
     return last / first if first > 0.0 else 0.0
 
 
@@ -184,4 +176,4 @@ def but_the_worst(cost: Array, count: Array) -> Index:
 
 def _few(segments: Array) -> int:
     """How many of so many segments are no more than a few."""
-    return min(max(1, round(FEW * segments.size)), (segments.size - 1) // 2)
+    return min(max(1, round(CRITERIA.few * segments.size)), (segments.size - 1) // 2)

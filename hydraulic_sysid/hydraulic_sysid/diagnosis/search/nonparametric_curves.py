@@ -23,9 +23,9 @@ from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.segments import Segments
 
 from .candidates import subsystem
+from .criteria import CRITERIA
 from .linearisation import Linearisation
 from .nonparametric import FILES, WITH_MEMORY
-from .score_test import ENOUGH
 
 KNOTS = 9
 _RIDGE = 1e-6  # of the largest diagonal: knots that nothing visits
@@ -81,7 +81,7 @@ class Place:
 
 def nonparametric_curves(at: Linearisation, say: Callable[[str], None]) -> list[NonparametricCurve]:
     """All curves, the one that explains most first. Empty for a plant that takes none of them."""
-    part, _ = at.sample(ENOUGH)
+    part, _ = at.sample(CRITERIA.enough_to_score)
     found = (curve(part, place) for place in places(part, say))
     return sorted((c for c in found if c is not None), key=lambda c: -c.reduction)
 

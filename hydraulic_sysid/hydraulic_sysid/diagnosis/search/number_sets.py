@@ -21,9 +21,8 @@ from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parallel import results
 
 from .candidates import RecordFeatures, candidates, observed, probes
-from .data_sheet import ROUGH
+from .criteria import CRITERIA
 from .linearisation import Linearisation
-from .score_test import ENOUGH
 
 
 def sets_of_one_effect(
@@ -36,7 +35,7 @@ def sets_of_one_effect(
     :param at: the fit in which they have the values that the records ask for
     :param freedom: what a number that is spared is worth of the sum of squares
     """
-    part, share = at.sample(ENOUGH)
+    part, share = at.sample(CRITERIA.enough_to_score)
     own = part.parameters
     off = np.array([(nominal.get(k, v) - v) for k, v in own.by_key.items()]) / own.scales
     places = [own.keys.index(k) for k in nominal]
@@ -49,7 +48,7 @@ def sets_of_one_effect(
             continue
         brought = len(normal.information) - len(off)
         left = {held: _cost(normal, np.concatenate((off, np.zeros(brought))), held) for held in sets}
-        simpler = [h for h in sets if len(h) > brought and left[h] < ROUGH * alone[h]]
+        simpler = [h for h in sets if len(h) > brought and left[h] < CRITERIA.rough * alone[h]]
         likely = {h: left[h] / share - len(h) * freedom for h in simpler}
         if likely:
             chosen = min(likely, key=lambda held: likely[held])

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .competing_models import ODDS
+from .criteria import CRITERIA, Criteria
 from .remainder import immaterial
 from .search_state import SearchResult
-from .unknown_law import CALIBRATION, Calibration, probability_of_unknown
+from .unknown_law import probability_of_unknown
 from .verdict import (
     COMPLETE,
     DATA_SHEET,
@@ -26,8 +26,6 @@ from .verdict import (
     Verdict,
     decisive_drift,
 )
-
-HIGH = 0.99  # nothing is said to be surer than this
 
 What = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 """Effects, numbers of the data sheet and faults of the recording."""
@@ -48,7 +46,7 @@ class Explanation:
     library: bool = True
 
 
-def explanations(result: SearchResult, verdict: Verdict, calibration: Calibration = CALIBRATION) -> list[Explanation]:
+def explanations(result: SearchResult, verdict: Verdict, criteria: Criteria = CRITERIA) -> list[Explanation]:
     """All that was compared, the most probable first; the probabilities add up to 1.
 
     Nothing where these do not say what is right: the search was ended before it was done, an effect was named by the
@@ -59,11 +57,11 @@ def explanations(result: SearchResult, verdict: Verdict, calibration: Calibratio
     moot = settled and not final.little and immaterial(final, result.remainders)
     if verdict.kind == UNDECIDED or result.by_force is not None or moot:
         return []
-    unknown = probability_of_unknown(result.before_laws, final, calibration)
+    unknown = probability_of_unknown(result.before_laws, final, criteria)
     if verdict.kind == OUTSIDE:
         # Not by what is left alone: a drift, a law bent to its limits. What is said is no less probable than all else.
         by_drift = decisive_drift(result) is not None
-        unknown = max(unknown, calibration.odds / (1.0 + calibration.odds) if by_drift else 0.5)
+        unknown = max(unknown, criteria.odds / (1.0 + criteria.odds) if by_drift else 0.5)
     elif verdict.kind in (MISSING, INDISTINGUISHABLE):
         unknown = min(unknown, 0.5)
     known = _known(result, verdict)
@@ -85,7 +83,7 @@ def sentence(found: Sequence[Explanation]) -> str:
     said = probability(found)
     if said is None:
         return ""
-    shown = f"over {100.0 * HIGH:.0f} %" if said > HIGH else f"{100.0 * said:.0f} %"
+    shown = f"over {100.0 * CRITERIA.surest:.0f} %" if said > CRITERIA.surest else f"{100.0 * said:.0f} %"
     return f"The probability of this verdict is {shown}."
 
 
@@ -113,5 +111,5 @@ def _known(result: SearchResult, verdict: Verdict) -> dict[What, tuple[float, bo
             found.setdefault(((*effects, effect), rest, faults), (1.0, True))
     if result.numbers_instead:
         others = (*numbers, *(d.key for d in result.numbers_instead))
-        found.setdefault((effects[:-1], others, faults), (1.0 / ODDS, False))
+        found.setdefault((effects[:-1], others, faults), (1.0 / CRITERIA.odds, False))
     return found

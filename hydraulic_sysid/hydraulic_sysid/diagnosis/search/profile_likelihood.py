@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .criteria import CRITERIA
 from .linearisation import Linearisation
 from .uncertainty import EXACT, Known, errors_beside, law_share
 
-VAGUE = 0.3  # standard error, of the value, from which an interval is sought by what it costs
 _NEAR = 0.25  # of the cost that is sought: near enough
 _MOST_FITS = 3  # towards one end
 _FURTHEST = 3.0  # times as far as before, or a third of it: no fit is further from the one before
@@ -63,7 +63,7 @@ def with_profiles(
     found = dict(known)
     for key, value in at.parameters.by_key.items():
         own = known[key]
-        if own.at_bound is not None or not own.standard_error < VAGUE * abs(value):
+        if own.at_bound is not None or not own.standard_error < CRITERIA.vague_value * abs(value):
             found[key] = replace(own, profile=_interval(at, key, cost if key in named else None, tolerances))
     return found
 

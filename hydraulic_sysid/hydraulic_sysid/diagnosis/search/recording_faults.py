@@ -23,16 +23,13 @@ from hydraulic_sysid.estimation.parallel import results
 from hydraulic_sysid.estimation.recording import Reading
 from hydraulic_sysid.estimation.segments import Segments
 
+from .criteria import CRITERIA
 from .drive_faults import DRIVE_HYPOTHESES, DriveHypothesis, disturbed, freedom
 from .linearisation import Linearisation
 
-ENOUGH = 50  # segments that do for a look
 MOST = 64.0  # sampling intervals by which a channel may be late, or per cent by which its gain may be off
 TRIED = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of these, from which the best size is searched
 PER_CENT = 0.01
-FILTERED = 0.95  # sampling intervals, or per cent: by less a sound transducer with its filter is late, too …
-ORDER = 0.6  # … and what only another order of conversion would make early
-SAME = 0.05  # sampling intervals by which two delays are one
 
 
 @dataclass(frozen=True)
@@ -127,7 +124,7 @@ class RecordingFault:
         if isinstance(self.hypothesis, DriveHypothesis) or self.hypothesis.what != "delay":
             return [self]
         whole = math.copysign(max(round(abs(self.size) / dt), 1) * dt, self.size)
-        return [self] if abs(self.size - whole) < SAME * dt else [replace(self, size=whole), self]
+        return [self] if abs(self.size - whole) < CRITERIA.same_delay * dt else [replace(self, size=whole), self]
 
     @property
     def linear(self) -> bool:
@@ -138,7 +135,7 @@ class RecordingFault:
         """Whether it is larger than what sound transducers and loggers with this sampling interval [s] do, too."""
         if isinstance(self.hypothesis, DriveHypothesis):
             return True
-        usual = ORDER if 1 not in self.hypothesis.ways else FILTERED
+        usual = CRITERIA.conversion_order if 1 not in self.hypothesis.ways else CRITERIA.filtered
         return abs(self.size) >= usual * self.hypothesis.step(dt)
 
     @property
@@ -165,7 +162,7 @@ def recording_faults(at: Linearisation, disturbances: bool = True) -> list[Recor
 
     ``disturbances``: whether those of the drive are tried, too.
     """
-    part, share = at.sample(ENOUGH)
+    part, share = at.sample(CRITERIA.enough_to_score)
     point = part.point
     runs = point.shooting.simulated(point.plant, point.initial_states)
     before = _cost(part, [p.raw for p in point.projections])
@@ -190,7 +187,7 @@ def resized(at: Linearisation, fault: RecordingFault) -> RecordingFault:
     """The same fault with the size that fits best now; the linearisation's segments have it already."""
     if isinstance(fault.hypothesis, DriveHypothesis):
         return fault
-    part, share = at.sample(ENOUGH)
+    part, share = at.sample(CRITERIA.enough_to_score)
     segments = [fault.hypothesis.applied(s, -fault.size) for s in part.point.shooting.segments]
     point = replace(part.point, shooting=replace(part.point.shooting, segments=segments))
     part = replace(part, point=point)

@@ -9,24 +9,17 @@ from functools import partial
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 
-from .candidate_fits import FULL, LATER_REFITS, NEAR, PROMISED
+from .criteria import CRITERIA
 from .data_sheet import relaxed, restored
 from .data_sheet_fits import DataSheetFits, new_effect
 from .drive_faults import costs_with
-from .fitting import FAR_OFF, Task, worse
+from .fitting import Task, worse
 from .holdout import Split
 from .misfit import explained, material, misfit
 from .recording_faults import RecordingFault, recording_faults, resized
 from .remainder import negligible
 from .search_state import FaultFit, SearchResult, SearchState, Together
-from .worth import FURTHER, NOTHING_LEFT, PROMISES, enough_at_first, leaves_most
-
-MOST_FAULTS = 3  # of the recording
-UNNOTICED = 0.003  # of the motion in a segment: what leaves less is no disturbance of the drive
-MOST_SIZES = 4  # times that the size of a fault is sought again, …
-SAME_SIZE = 0.005  # … until it changes by no more than this share: what is left of a gain is an offset
-RIVAL = 0.8  # of what the best candidate explains, from which a fault of the recording may be in its place
-GLIMPSED = 0.25  # of what an effect must explain, which a fault of a reading must before the model is fitted with it
+from .worth import enough_at_first, leaves_most
 
 
 class RecordingFits(DataSheetFits):
@@ -52,18 +45,18 @@ class RecordingFits(DataSheetFits):
             nothing = self.nothing_left(base)
             if not nothing:
                 base = self.explore(base)
-            if self._assumed == MOST_FAULTS:
+            if self._assumed == CRITERIA.most_faults:
                 break
             self.say("faults of the recording")
             # A disturbance is free enough to take up what laws leave, the reading of a channel is not.
-            disturbances = not (nothing or negligible(base.remainders, UNNOTICED) or base.immaterial)
+            disturbances = not (nothing or negligible(base.remainders, CRITERIA.unnoticed) or base.immaterial)
             faults = recording_faults(base.linearisation, disturbances)
             if nothing and not any(self.bends(f, base) for f in faults):
                 break
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
-            enough = RIVAL * (base.misfit.fit - best)
+            enough = CRITERIA.rival * (base.misfit.fit - best)
             named = [f for f in faults if not base.misfit.little or f.unusual(self.split.interval)]
-            self.rivals = [f for f in named if not f.linear and f.reduction >= enough][:FULL]
+            self.rivals = [f for f in named if not f.linear and f.reduction >= enough][: CRITERIA.most_finished]
             least = base.misfit.fit - best - base.misfit.least
             found = self.fault(base, faults, least)
             if found is None or leaves_most(base.misfit, found.misfit) or base.misfit.fit - found.misfit.fit < least:
@@ -84,13 +77,14 @@ class RecordingFits(DataSheetFits):
         """The best of these faults, fitted; None where none is worth it, or promises to explain ``least``."""
         # A disturbance acts linearly, so that its evidence is that of a full fit; a delay and a low pass do not.
         readings = [f for f in faults if not f.linear]
-        near = [f for f in readings if f.reduction >= max(NEAR * readings[0].reduction, GLIMPSED * least)][:FULL]
+        enough = max(CRITERIA.near * readings[0].reduction, CRITERIA.glimpsed * least) if readings else 0.0
+        near = [f for f in readings if f.reduction >= enough][: CRITERIA.most_finished]
         if faults and faults[0].linear and faults[0].reduction >= least:
             near = faults[:1]
         if not near:
             return None
-        found = self.plainest(base, [self.with_fault(base, f, PROMISED * least) for f in near])
-        worth = material(base.misfit, found.misfit) and explained(base.misfit, found.misfit) >= FURTHER
+        found = self.plainest(base, [self.with_fault(base, f, CRITERIA.promised * least) for f in near])
+        worth = material(base.misfit, found.misfit) and explained(base.misfit, found.misfit) >= CRITERIA.further
         return found if worth else None
 
     def assume(self, found: FaultFit, beside: SearchState, base: SearchState) -> None:
@@ -113,7 +107,8 @@ class RecordingFits(DataSheetFits):
 
         :param share: of what is left, that it must explain
         """
-        if self._assumed == MOST_FAULTS or (further is None and state.misfit.variance - 1.0 < NOTHING_LEFT):
+        nothing = further is None and state.misfit.variance - 1.0 < CRITERIA.nothing_left
+        if nothing or self._assumed == CRITERIA.most_faults:
             return None
         self.say("faults of the recording")
         best = state.misfit.fit if further is None else further.misfit.fit
@@ -134,12 +129,12 @@ class RecordingFits(DataSheetFits):
         next to nothing of what a fit explains: then they need not.
         """
         (known, effect), self._first_effect = self._first_effect, (None, None)
-        promised = 0.0 if base.misfit.variance >= FAR_OFF else PROMISED
+        promised = 0.0 if base.misfit.variance >= CRITERIA.far_off else CRITERIA.promised
         return effect if known is base else self.finish(base, partial(enough_at_first, base), promised)
 
     def bends(self, fault: RecordingFault, base: SearchState) -> bool:
         """Whether a fault is why a model leaves nothing only with small delays of all channels, or at bounds."""
-        return fault.unusual(self.split.interval) and fault.reduction > PROMISES * base.misfit.least
+        return fault.unusual(self.split.interval) and fault.reduction > CRITERIA.promises * base.misfit.least
 
     def with_fault(self, base: SearchState, fault: RecordingFault, least: float = 0.0) -> FaultFit:
         """A state fitted to records that are taken to have a fault, again while the fault's best size changes.
@@ -155,11 +150,11 @@ class RecordingFits(DataSheetFits):
                 if base.misfit.fit - state.misfit.fit >= least:
                     state = self.begun_anew(state)
                 tried.append((sized, state, self.split))
-                if state.misfit.variance - 1.0 < NOTHING_LEFT:
+                if state.misfit.variance - 1.0 < CRITERIA.nothing_left:
                     break
             fault, state, self.split = min(tried, key=lambda one: one[1].misfit.total)
-            for _ in range(MOST_SIZES if base.misfit.fit - state.misfit.fit >= least else 0):
-                new, error = resized(state.linearisation, fault), SAME_SIZE * abs(fault.size)
+            for _ in range(CRITERIA.most_sizes if base.misfit.fit - state.misfit.fit >= least else 0):
+                new, error = resized(state.linearisation, fault), CRITERIA.same_size * abs(fault.size)
                 if new is fault or abs(new.size - fault.size) < max(error, 2.0 * new.standard_error):
                     break
                 fault = replace(new, reduction=fault.reduction)
@@ -177,7 +172,7 @@ class RecordingFits(DataSheetFits):
         Nothing on a data sheet makes a delay look like a low pass.
         """
         best = min(fits, key=lambda f: f.misfit.total)
-        worth = NEAR * (base.misfit.total - best.misfit.total)
+        worth = CRITERIA.near * (base.misfit.total - best.misfit.total)
         gains = [f for f in fits if f.fault.unit == best.fault.unit == "1"]
         alike = [f for f in gains if base.misfit.total - f.misfit.total >= worth]
         if len(alike) < 2 or self._strict(base):
@@ -235,7 +230,7 @@ class RecordingFits(DataSheetFits):
         try:
             alone = self.with_moved(effect, ())
             if not worse(alone.misfit, found.final.misfit):
-                strict = self.explore(base if self._strict(base) else self.with_moved(base, ()), LATER_REFITS)
+                strict = self.explore(base if self._strict(base) else self.with_moved(base, ()), CRITERIA.later_refits)
                 return replace(
                     found, split=self.split, base=strict, final=alone, misfits={name: alone.misfit},
                     competing={name: strict}, moved=(), faults=(), as_recorded=None,

@@ -9,11 +9,9 @@ import numpy as np
 
 from hydraulic_sim.arrays import Array
 
+from .criteria import CRITERIA
 from .holdout import Split
-from .misfit import SMALL, Misfit
-
-NEGLIGIBLE = 0.005  # of the motion in a segment: no law of a library is that of a bench to five parts in a thousand
-NOTHING = 0.001  # of the motion, in every channel: less is nothing to anybody, however little noise the sensors have
+from .misfit import Misfit
 
 
 @dataclass(frozen=True)
@@ -62,14 +60,14 @@ def remainders(split: Split, residual: Sequence[Array]) -> list[Remainder]:
     return found
 
 
-def negligible(found: list[Remainder], share: float = NEGLIGIBLE) -> bool:
+def negligible(found: list[Remainder], share: float = CRITERIA.negligible) -> bool:
     """Whether what is left is below what any law of a library leaves, or below another ``share`` of the motion."""
     return bool(found) and all(r.share < share for r in found)
 
 
 def immaterial(misfit: Misfit, found: list[Remainder]) -> bool:
     """Whether what is left is nothing to anybody, and not far off the noise or less than any law is right to."""
-    return negligible(found, NEGLIGIBLE if misfit.usual <= SMALL else NOTHING)
+    return negligible(found, CRITERIA.negligible if misfit.usual <= CRITERIA.small else CRITERIA.immaterial)
 
 
 def spikes(split: Split) -> list[Spikes]:

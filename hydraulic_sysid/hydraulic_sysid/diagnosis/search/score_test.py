@@ -22,13 +22,8 @@ from hydraulic_sysid.estimation.parallel import results
 from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import LARGE, SIZES, SMALL, Probe, RecordFeatures, between, inverse, observed, probes
+from .criteria import CRITERIA
 from .linearisation import Linearisation
-
-ENOUGH = 50  # segments that do for a look, spread over all records
-MANY = 8  # groups of probes of one effect, beyond which …
-NEAREST = 4  # … only those are looked at on all of these that promise most on one record's
-TOO_FAR = 1.0  # times the sum of squares that is left: a probe that changes more than this is no first order
-AS_WELL = 0.5  # of the best prediction, from which that of another shape is a start as well
 
 
 @dataclass(frozen=True)
@@ -55,7 +50,7 @@ class _Prediction:
 
 def score(at: Linearisation, effects: Sequence[Effect], features: RecordFeatures) -> list[CandidateScore]:
     """All candidates, the best first; reductions of all segments for fitting, of which a sample is looked at."""
-    part, share = at.sample(ENOUGH)
+    part, share = at.sample(CRITERIA.enough_to_score)
     one = part.of_one_record()
     _ = part.own_reduction, part.costs, one.own_reduction, one.costs  # once, for all that work at the same time
     found = list(results(lambda effect: _score(part, one, effect, features), effects))
@@ -72,17 +67,18 @@ def _score(at: Linearisation, one: Linearisation, effect: Effect, features: Reco
 
     def predictions(sizes: Sequence[float]) -> list[_Prediction]:
         groups = list(probes(effect, features, sizes))
-        if len(groups) > MANY:
+        if len(groups) > CRITERIA.many_probes:
             rough = [(_predict(one, model, effect, group), group) for group in groups]
             near = sorted([(p.score.reduction, i) for i, (p, _) in enumerate(rough) if p is not None], reverse=True)
-            groups = [groups[i] for _, i in near[:NEAREST]] if len(near) >= NEAREST else groups
+            nearest = [groups[i] for _, i in near[: CRITERIA.nearest_probes]]
+            groups = nearest if len(nearest) == CRITERIA.nearest_probes else groups
         every = [_predict(at, model, effect, group) for group in groups]
         return [p for p in every if p is not None]
 
     tried = [predictions(SIZES)]
     if not tried[0]:
         tried.append(predictions(LARGE))
-    if not tried[-1] or min(p.change for p in tried[-1]) > TOO_FAR:
+    if not tried[-1] or min(p.change for p in tried[-1]) > CRITERIA.too_far:
         tried.append(predictions(SMALL))
     found = [p.score for every in tried for p in every]
     return _best(found) if found else None
@@ -95,7 +91,7 @@ def _best(found: Sequence[CandidateScore]) -> CandidateScore:
     seen, more = {tuple(best.start[key] for key in shape)}, list(best.others)
     for one in rest:
         own = tuple(one.start[key] for key in shape)
-        if own not in seen and one.reduction > AS_WELL * best.reduction:
+        if own not in seen and one.reduction > CRITERIA.starts_as_well * best.reduction:
             seen.add(own)
             more.append(one.start)
     return replace(best, others=tuple(more))

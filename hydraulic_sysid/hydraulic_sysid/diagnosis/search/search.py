@@ -22,50 +22,30 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.refinement import outlying
 
-from .candidate_fits import LATER_REFITS
 from .candidates import candidates
 from .competing_models import competing_models
+from .criteria import CRITERIA
 from .data_sheet import restored, tolerances
 from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
-from .fitting import FAR_OFF, Task, quieter, retimed, spiked
+from .fitting import Task, quieter, retimed, spiked
 from .force_balance import drives_by_force, force_shares
 from .force_curves import Forces
 from .frozen_jacobian import Refit
 from .linearisation import Linearisation
-from .misfit import SMALL, Misfit, explained, material
+from .misfit import Misfit, explained, material
 from .nonparametric_curves import NonparametricCurve, nonparametric_curves
 from .profile_likelihood import with_profiles
 from .progress import OutOfTimeError
-from .recording_fits import RIVAL, RecordingFits
+from .recording_fits import RecordingFits
 from .score_test import CandidateScore, score
 from .search_state import CandidateRefit, SearchResult, SearchState
 from .set_aside import accidents
 from .spectral_lines import record_features
 from .uncertainty import Known, parameter_errors
 from .unseen import TriedOut, tried_out
-from .worth import (
-    AS_GOOD,
-    FURTHER,
-    MORE_THAN_NOISE,
-    MOSTLY,
-    NOTHING_LEFT,
-    PROMISES,
-    anything,
-    borrowed,
-    decisive,
-    near_competitors,
-    superfluous,
-    without_competitor,
-    worth_adding,
-)
-
-MOST_EFFECTS = 6
-MOST_SWAPS = 3
-SAME = 0.9  # collinearity of a rival with an effect, from which it cannot leave far more, …
-MOST_STUCK = 2  # … and how many such are fitted anew
-APART = 0.5  # collinearity below which an effect and a rival cannot leave as little as each other by what they do
+from .worth import anything, borrowed, decisive, near_competitors, superfluous, without_competitor, worth_adding
 
 
 class Search(RecordingFits):
@@ -118,7 +98,7 @@ class Search(RecordingFits):
         competing = dict(found.competing)
         for name, without in found.competing.items():
             rivals = competing_models(name, without, found.final.misfit)
-            stuck = {c.name for c in rivals if c.distinguishable and c.collinearity > SAME}
+            stuck = {c.name for c in rivals if c.distinguishable and c.collinearity > CRITERIA.same_change}
             if not stuck:
                 continue
             with suppress(SimulationError):  # it does not run without the effect
@@ -126,7 +106,7 @@ class Search(RecordingFits):
                 at = bare.linearisation
                 effects = [e for e in candidates(bare.model) if e.name in stuck]
                 scores = score(at, effects, record_features(at))
-                again = [self._begun_at(bare, s) for s in scores[:MOST_STUCK]]
+                again = [self._begun_at(bare, s) for s in scores[: CRITERIA.most_stuck]]
                 best = {r.name: r for r in without.refits}
                 for r in again:
                     best[r.name] = min(best[r.name], r, key=lambda one: one.misfit.total)
@@ -142,11 +122,12 @@ class Search(RecordingFits):
         competing, base = dict(found.competing), found.base
         for name, without in found.competing.items():
             rivals = competing_models(name, without, found.final.misfit)
-            if self._strict(without) or not any(not c.distinguishable and c.collinearity < APART for c in rivals):
+            other = [c for c in rivals if not c.distinguishable and c.collinearity < CRITERIA.other_change]
+            if self._strict(without) or not other:
                 continue
             bare = restored(found.final.model.without_effect(name), self.given, [d.key for d in found.moved])
             with suppress(SimulationError):  # it does not run without the effect
-                again = self.explore(self.state(bare, self._last), most=LATER_REFITS)
+                again = self.explore(self.state(bare, self._last), most=CRITERIA.later_refits)
                 competing[name] = again
                 base = replace(base, refits=again.refits, scores=again.scores) if len(found.added) == 1 else base
         return replace(found, competing=competing, base=base)
@@ -174,9 +155,11 @@ class Search(RecordingFits):
         """As `by_force`, by these candidates alone beside a model; all values are what the forces ask for."""
         self.say("the force that the motion asks for beyond the model")
         shares = force_shares(model, self.split.records(), scores)
-        if not shares or shares[0].share < FURTHER or any(s.share > RIVAL * shares[0].share for s in shares[1:]):
+        if not shares or shares[0].share < CRITERIA.further:
             return found
-        best = shares[0]
+        best, *others = shares
+        if any(s.share > CRITERIA.rival * best.share for s in others):
+            return found
         base, state = self.as_it_is(best.without), self.as_it_is(best.model)
         self.say.reached([best.name], state.misfit)
         return replace(found, base=base, final=state, misfits={best.name: state.misfit}, by_force=best)
@@ -185,7 +168,7 @@ class Search(RecordingFits):
         """With the parameter of its final model that changes along the records, if there is one."""
         self.say("whether any parameter changes along the records")
         with suppress(SimulationError):  # a parameter cannot be moved
-            return replace(found, drift=drift(found.final.linearisation, PROMISES * found.final.misfit.least))
+            return replace(found, drift=drift(found.final.linearisation, CRITERIA.promises * found.final.misfit.least))
         return found
 
     def with_final_values(self, found: SearchResult) -> SearchResult:
@@ -276,7 +259,7 @@ class Search(RecordingFits):
 
     def onward(self, base: SearchState, model: Model, known: SearchState) -> SearchResult:
         """The search from what is ``known`` on, its ``base`` and what was tried there fitted anew to ``model``."""
-        tried = [r.name for r in base.refits[:LATER_REFITS]]
+        tried = [r.name for r in base.refits[: CRITERIA.later_refits]]
         again = self.state(model, self._last)
         refits = list(self.refitted(again, [s for s in base.scores if s.effect.name in tried], full=0))
         again = replace(again, refits=sorted(refits, key=lambda r: r.misfit.total), scores=base.scores)
@@ -286,9 +269,9 @@ class Search(RecordingFits):
         """Forward from the base or from what is ``known``, backward, and every effect added against its competitors."""
         path = [base] if known is None else [base, known]
         added, self.path = new_effects(path[-1], base), path
-        if known is not None and known.misfit.variance - 1.0 > NOTHING_LEFT:
-            path[-1] = self.explore(known, most=LATER_REFITS)
-        while len(added) < MOST_EFFECTS:
+        if known is not None and known.misfit.variance - 1.0 > CRITERIA.nothing_left:
+            path[-1] = self.explore(known, most=CRITERIA.later_refits)
+        while len(added) < CRITERIA.most_effects:
             if added:
                 better = self.finish(path[-1], partial(worth_adding, base, path[-1], added))
             else:
@@ -304,10 +287,10 @@ class Search(RecordingFits):
                 better = None
             needed = 0.0
             if better is not None and added:
-                needed = AS_GOOD * self.share_of_a_curve(path[-1], better)
+                needed = CRITERIA.as_good_as_a_curve * self.share_of_a_curve(path[-1], better)
                 better = better if explained(path[-1].misfit, better.misfit) >= needed else None
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
-            doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= NOTHING_LEFT)
+            doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= CRITERIA.nothing_left)
             loose = self.loose(path[-1]) if doubtful else None
             if loose is not None and (better is None or loose.misfit.total < better.misfit.total):
                 loose, model = self.judged(loose), loose.model
@@ -322,13 +305,13 @@ class Search(RecordingFits):
             added.append(new_effect(better, path[-1]))
             self.path = [*path, better]
             self.say.reached(added, better.misfit)
-            last = len(added) == MOST_EFFECTS and explained(base.misfit, better.misfit) > MOSTLY
+            last = len(added) == CRITERIA.most_effects and explained(base.misfit, better.misfit) > CRITERIA.mostly
             # What was judged by a model that lacked it would ask for further effects.
-            again = None if last or better.misfit.variance >= FAR_OFF else self.judged_anew(better)
+            again = None if last or better.misfit.variance >= CRITERIA.far_off else self.judged_anew(better)
             if again is not None:
                 return self.onward(base, base.model, again)
             nothing = self.nothing_left(better)
-            path.append(better if nothing or last else self.explore(better, most=LATER_REFITS))
+            path.append(better if nothing or last else self.explore(better, most=CRITERIA.later_refits))
             if nothing:
                 break
         final, competing = path[-1], {added[-1]: path[-2]} if added and known is None else {}
@@ -354,7 +337,8 @@ class Search(RecordingFits):
         of one that the library lacks, and one effect after the other would only imitate it. What is missing explains
         more, fitted, than a curve does to first order. A curve over the time is the shape of none.
         """
-        if before.misfit.variance < MORE_THAN_NOISE or explained(before.misfit, after.misfit) >= AS_GOOD:
+        most = explained(before.misfit, after.misfit) >= CRITERIA.as_good_as_a_curve
+        if most or before.misfit.variance < CRITERIA.more_than_noise:
             return 0.0
         return max((c.share for c in self.curves(before, self.say) if c.variable != "time"), default=0.0)
 
@@ -421,7 +405,7 @@ class Search(RecordingFits):
                 continue
             if name in competing:
                 continue
-            without = self.explore(without, most=LATER_REFITS, anew=False)
+            without = self.explore(without, most=CRITERIA.later_refits, anew=False)
             competing = {**competing, name: without}
             # Added last, it may lead on from where the fit had stopped.
             for own in (r for r in without.refits if r.name == name and r.misfit.total < state.misfit.total):
@@ -430,7 +414,7 @@ class Search(RecordingFits):
                     again = self.begun_anew(self.state(own.refit.model, self._last))
                     state = min(state, again, key=lambda s: s.misfit.total)
             near = near_competitors(base, without, state, name)
-            other = self.finish(near, anything) if swaps < MOST_SWAPS else None
+            other = self.finish(near, anything) if swaps < CRITERIA.most_swaps else None
             if other is not None and self.with_freedom(state) - self.with_freedom(other) > state.misfit.least:
                 new = new_effect(other, without)
                 self.say(f"{new} in the place of {name}")
@@ -460,7 +444,7 @@ class Search(RecordingFits):
 
 def judged_by_force(base: SearchState) -> bool:
     """Whether what a state leaves is nothing to anybody, but by the sensor's noise much, and its drive is the force."""
-    return base.immaterial and base.misfit.usual > SMALL and drives_by_force(base.model)
+    return base.immaterial and base.misfit.usual > CRITERIA.small and drives_by_force(base.model)
 
 
 def accidents_named(found: SearchResult) -> SearchResult:

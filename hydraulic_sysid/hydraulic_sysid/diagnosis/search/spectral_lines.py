@@ -16,15 +16,13 @@ from hydraulic_sysid.estimation.noise import code_step
 from hydraulic_sysid.estimation.segments import Segments
 
 from .candidates import RecordFeatures
+from .criteria import CRITERIA
 from .linearisation import Linearisation
 
-STANDS_OUT = 30.0  # power of a line over the median around it
 _AROUND = 201  # bins
 _FINER = 4  # zero padding: bins between those of a record
 _BESIDE = 3.0  # Hz, within which side bands of a line lie
 _MOST = 2
-_VISIBLE = 0.3  # of a channel's noise, from which its steps are no mere rounding of a file
-_COARSER = 0.6  # of the codes of the pressures' converters, below which a position has a coarse sensor of its own
 _MOST_BINS = 1_000_000
 _SLOWEST = 2.0  # Hz, slower is drift within a segment
 
@@ -48,7 +46,8 @@ def _converted(segments: Segments, codes: float, supply: float) -> bool:
     But not those of a position with far fewer ``codes`` over its stroke than they have over the ``supply`` pressure.
     """
     return any(
-        (step := code_step(segments.record[channel])) > _VISIBLE * noise and codes > _COARSER * supply / step
+        (step := code_step(segments.record[channel])) > CRITERIA.steps_visible * noise
+        and codes > CRITERIA.coarser * supply / step
         for channel, noise in zip(segments.channels, segments.noise_std.tolist(), strict=True)
         if channel != "position"
     )
@@ -69,7 +68,8 @@ def spectral_lines(segments: Sequence[Segments], residuals: Sequence[Array]) -> 
         return ()
     finest = max(spectra, key=lambda s: len(s.frequency)).frequency
     together = np.sum([np.interp(finest, s.frequency, s.clear, right=0.0) for s in spectra], axis=0)
-    heights = [(finest, together / _by_chance(len(spectra))), *((s.frequency, s.clear / STANDS_OUT) for s in spectra)]
+    single = [(s.frequency, s.clear / CRITERIA.line_stands_out) for s in spectra]
+    heights = [(finest, together / _by_chance(len(spectra))), *single]
     peaks = sorted(((float(h.max()), float(frequency[np.argmax(h)])) for frequency, h in heights), reverse=True)
     distinct: list[float] = []
     for height, at in peaks:
@@ -84,8 +84,8 @@ def spectral_lines(segments: Sequence[Segments], residuals: Sequence[Array]) -> 
 
 
 def _by_chance(records: int) -> float:
-    """What the sum over records exceeds as seldom as one of them does `STANDS_OUT`, each over its median."""
-    return float(gamma.isf(2.0**-STANDS_OUT, records) / math.log(2.0))
+    """What the sum over records exceeds as seldom as one does `Criteria.line_stands_out`, each over its median."""
+    return float(gamma.isf(2.0**-CRITERIA.line_stands_out, records) / math.log(2.0))
 
 
 @dataclass(frozen=True)

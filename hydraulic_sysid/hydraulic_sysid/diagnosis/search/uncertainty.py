@@ -29,11 +29,9 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.covariance import inverse, sandwich
 
+from .criteria import CRITERIA
 from .linearisation import Linearisation
 
-SHARED = 3.0  # times the scatter of an effect's parameter: its error, with what all segments and records share of it
-_LAW = 0.01  # of a parameter's value: standard error for the law that it stands in, …
-_SHAPE = 0.02  # … of what shapes the law of an effect (a speed, a gap, a time), which others write down otherwise
 _COVERED = 0.95
 _FEWEST = 3  # records whose scatter says something
 _STEP = 0.25  # of a tolerance: how far a held number is moved to see what it changes
@@ -60,7 +58,7 @@ class Known:
 
 
 def parameter_errors(
-    at: Linearisation, tolerances: Mapping[str, float] = EXACT, shared: float = SHARED
+    at: Linearisation, tolerances: Mapping[str, float] = EXACT, shared: float = CRITERIA.shared
 ) -> dict[str, Known]:
     """By key, of all parameters that were fitted. One at a bound counts as fixed there.
 
@@ -100,7 +98,7 @@ def may_be_nothing(at: Linearisation, effect: Effect) -> bool:
 
 
 def errors_beside(
-    at: Linearisation, free: Index, tolerances: Mapping[str, float], shared: float = SHARED
+    at: Linearisation, free: Index, tolerances: Mapping[str, float], shared: float = CRITERIA.shared
 ) -> tuple[Array, Array]:
     """Standard errors (F,) and half widths (F,) of 95 % of the parameters ``free``, the others held, of their scales.
 
@@ -118,8 +116,8 @@ def law_share(model: Model, key: str) -> float:
     """Standard error of a parameter for the law that it stands in, of its value; gauges and drawings tell of no law."""
     record = model.parameter(key)
     if "." not in key:
-        return _LAW if record.free or record.nuisance else 0.0
-    return _SHAPE if record.null is None else _LAW
+        return CRITERIA.law_error if record.free or record.nuisance else 0.0
+    return CRITERIA.shape_error if record.null is None else CRITERIA.law_error
 
 
 def _of_held(at: Linearisation, free: Index, bread: Array, tolerances: Mapping[str, float]) -> Array:

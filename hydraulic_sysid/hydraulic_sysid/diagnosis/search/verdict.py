@@ -17,17 +17,17 @@ from hydraulic_sysid.estimation.parameters import Parameters
 
 from .candidates import candidates, subsystem
 from .competing_models import CompetingModel, competing_models
+from .criteria import CRITERIA
 from .data_sheet import Deviation
 from .drift import LEAST, Drift
 from .drive_faults import DriveHypothesis
-from .misfit import SMALL, SMALL_UNEXPLAINED, UNSEEN, unexplained_share
+from .misfit import unexplained_share
 from .nonparametric_curves import NonparametricCurve
-from .remainder import NOTHING, Remainder, Spikes, immaterial
+from .remainder import Remainder, Spikes, immaterial
 from .search_state import SearchResult, Together
 from .set_aside import DIFFERENT, FAR_OFF, SATURATED, SetAside
 from .unknown_law import probability_of_unknown
 from .whiteness import Whiteness
-from .worth import FURTHER
 
 MISSING = "missing"
 INDISTINGUISHABLE = "indistinguishable"
@@ -41,18 +41,7 @@ DECIDED = (MISSING, COMPLETE, DATA_SHEET, RECORDING)
 
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
-VAGUE = 1.5  # mean square over noise that a drive which is known in part may leave, …
-MUCH = 4.0  # … and from which on it is not what is wrong, …
-BLAMED = 0.5  # … nor where more than this share of what was to be explained is left
-UNEXPLAINED = 0.2  # of what was to be explained: more than that left is no matter of a law's details
-BESIDE = 0.1  # the same beside an effect: a law left 5 % at most, a proxy 10 to 15 %
-UNATTRIBUTED = 0.125  # of what is left: a curve that explains less of it shows no law that is missing
-SHOWN = 0.5  # of what is left: a curve that explains more of it is a law that is missing, where more than …
-RIGHT = 9.0  # … this mean square over noise is left: the laws of effects rightly named left 7.2 at most
-LIKE = 0.9  # of what the best curve explains, from which another one tells as well where it is
-SEEN = 0.1  # of the noise, below which what remains beyond it is that of the noise's own estimate
 IN_LINE = ("valve", "sensor")  # subsystems that a signal passes on its way from the command to what is read
-BELOW = 0.9  # residual over noise below which the noise model is doubted
 
 
 @dataclass(frozen=True)
@@ -85,7 +74,8 @@ def conclusive(result: SearchResult) -> SearchResult:
 
     That is where they leave much, or where there was little left for them to explain.
     """
-    vague = drive_blamed(result) and (result.base.misfit.variance < VAGUE or kind_of(result, tied=False) == OUTSIDE)
+    little = result.base.misfit.variance < CRITERIA.vague_drive
+    vague = drive_blamed(result) and (little or kind_of(result, tied=False) == OUTSIDE)
     if result.added and vague:
         return replace(
             result, final=result.base, misfits={}, competing={}, faults_instead=(), together_instead=Together(),
@@ -156,19 +146,19 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     little = final.little or immaterial(final, result.remainders) or result.by_force is not None
     if not result.added:
         # Faults of the recording may have explained the most of it.
-        if not little and unexplained_share(result.before_laws, final) > UNEXPLAINED:
+        if not little and unexplained_share(result.before_laws, final) > CRITERIA.unexplained:
             return RECORDING if drive_blamed(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if strained(result) and not tied:
         return OUTSIDE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
-    no_law = bool(curves) and all(c.share < UNATTRIBUTED for c in curves)
-    details = final.variance < SMALL or no_law
-    if final.usual > RIGHT and any(c.share > SHOWN for c in curves):
+    no_law = bool(curves) and all(c.share < CRITERIA.unattributed for c in curves)
+    details = final.variance < CRITERIA.small or no_law
+    if final.usual > CRITERIA.right_law and any(c.share > CRITERIA.law_shown for c in curves):
         return OUTSIDE
-    allowed = SMALL_UNEXPLAINED if details else BESIDE
-    if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * UNSEEN:
+    allowed = CRITERIA.small_unexplained if details else CRITERIA.unexplained_beside
+    if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * CRITERIA.noise_missed:
         return OUTSIDE
     if probability_of_unknown(result.before_laws, final) > 0.5 and not no_law:
         return OUTSIDE
@@ -190,7 +180,7 @@ def decisive_drift(result: SearchResult) -> Drift | None:
     found, final = result.drift, result.final.misfit
     if found is None or drive_unknown(result) or (result.added and abs(found.share) < LEAST):
         return None
-    return found if final.little or found.explained >= FURTHER * final.excess else None
+    return found if final.little or found.explained >= CRITERIA.further * final.excess else None
 
 
 def drifting_effect(result: SearchResult) -> str | None:
@@ -210,8 +200,8 @@ def drive_blamed(result: SearchResult) -> bool:
     Disturbances of a drive are free enough to take up a part of anything.
     """
     left = result.base.misfit
-    most = unexplained_share(result.before_over_noise, left) < BLAMED
-    return drive_unknown(result) and most and left.usual < MUCH
+    most = unexplained_share(result.before_over_noise, left) < CRITERIA.blamed
+    return drive_unknown(result) and most and left.usual < CRITERIA.far_off
 
 
 def strained(result: SearchResult) -> bool:
@@ -248,10 +238,10 @@ def elsewhere(result: SearchResult, curves: Sequence[NonparametricCurve]) -> Non
     What drifts elsewhere may be followed by a parameter of the model: the zero of a sensor by that of a valve.
     """
     drifting = drifting_effect(result)
-    if drifting is None or not curves or curves[0].share < SHOWN:
+    if drifting is None or not curves or curves[0].share < CRITERIA.law_shown:
         return None
     own = subsystem(result.model.library[drifting])
-    return None if any(c.subsystem == own and c.share > LIKE * curves[0].share for c in curves) else curves[0]
+    return None if any(c.subsystem == own and c.share > CRITERIA.alike * curves[0].share for c in curves) else curves[0]
 
 
 def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
@@ -266,7 +256,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
             f"{_and(result.added)} added. {fell}" if result.added else f"no effect added, {final:.3g} × noise left."
         )
         return " ".join([f"Undecided: the search was ended before it was done. Best so far: {reached}", *aside])
-    if verdict.kind == COMPLETE and result.final.misfit.usual > SMALL:
+    if verdict.kind == COMPLETE and result.final.misfit.usual > CRITERIA.small:
         return " ".join([
             f"Complete: these sensors show more than any law is right to (on validation data {final:.3g} × noise).",
             left, *aside,
@@ -283,7 +273,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         return " ".join(["Data sheet:", *data_sheet_sentences(result), *aside, fell, left, NO_EFFECT])
     aside = [*drift_sentences(result), *aside]
     beside = [*force_sentences(result), *data_sheet_sentences(result), *recording_sentences(result), *aside]
-    if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > UNEXPLAINED:
+    if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > CRITERIA.unexplained:
         beside.append(remainder_sentence(result.remainders))
     if verdict.kind == MISSING:
         fall = [] if result.by_force is not None else [fell]
@@ -308,8 +298,8 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         over = f"{best.summary} over {best.variable.replace('_', ' ')}"
         more = "" if drift is None else " more"
         looks = f"It looks{more} like {over}, which would explain {100 * best.share:.0f} % of it."
-        nothing = f"No curve at any place of the plant would explain {100 * UNATTRIBUTED:.0f} % of it."
-        text += looks if best.share > UNATTRIBUTED else nothing
+        nothing = f"No curve at any place of the plant would explain {100 * CRITERIA.unattributed:.0f} % of it."
+        text += looks if best.share > CRITERIA.unattributed else nothing
     # Not what the numbers of the data sheet were bent to: they imitate what no effect explains.
     return " ".join([text.strip(), *recording_sentences(result), *aside])
 
@@ -348,11 +338,11 @@ def _changes(result: SearchResult, d: Drift) -> str:
 
 def remainder_sentence(found: Sequence[Remainder]) -> str:
     """What the remainder means to somebody who uses the model."""
-    seen = [r for r in found if r.beyond > SEEN * r.noise]
+    seen = [r for r in found if r.beyond > CRITERIA.remainder_seen * r.noise]
     if not seen:
         return "Nothing remains beyond the noise."
     sizes = _and([f"{quantity(r.beyond, UNITS[r.channel], 2)} of {TITLES[r.channel]}" for r in seen])
-    most = percent(max(NOTHING, *(r.share for r in seen)))
+    most = percent(max(CRITERIA.immaterial, *(r.share for r in seen)))
     return f"What remains beyond the noise is {sizes}, at most {most} of the motion in a segment."
 
 
@@ -370,7 +360,7 @@ def _coloured(found: Whiteness) -> str:
 
 
 def _below(found: Whiteness) -> str:
-    if found.rms > BELOW:
+    if found.rms > CRITERIA.below_noise:
         return ""
     return f"{TITLES[found.channel]} leaves {found.rms:.2g} × its noise: the noise was taken for larger than it is."
 

@@ -10,10 +10,10 @@ from scipy.stats import chi2
 
 from hydraulic_sim.arrays import Array
 
+from .criteria import CRITERIA
 from .holdout import Split
 
 LAGS = 20  # samples
-COLOURED = 0.1  # correlation from which a residual is called coloured: over thousands of samples any model has some
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Whiteness:
     @property
     def coloured(self) -> bool:
         """By more than a noise model misses."""
-        return abs(self.correlation) > COLOURED
+        return abs(self.correlation) > CRITERIA.coloured
 
 
 def whiteness(split: Split, residual: Sequence[Array]) -> list[Whiteness]:

@@ -11,35 +11,17 @@ from hydraulic_sim.errors import SimulationError
 
 from .candidates import observed, subsystem
 from .competing_models import competing_models
-from .misfit import SMALL_UNEXPLAINED, Misfit, explained, material
+from .criteria import CRITERIA
+from .misfit import Misfit, explained, material
 from .search_state import SearchResult, SearchState
 from .uncertainty import may_be_nothing
-
-FAR = 5.0  # times what the best leaves: what leaves more comes not near it
-FURTHER = 0.25  # of what is left, which a further effect must explain, unless it explains a good part of all
-NEEDED = 0.02  # of all that was explained, which an effect must explain beside the others to stay
-SUBORDINATE = 0.1  # of all that was explained, below which a further effect must be told apart to be named
-LAW = 0.0025  # of all that was explained: what a law that is right to a twentieth leaves for others of its subsystem …
-ELSEWHERE = 0.0005  # … and for those of other subsystems
-DISTANT = 0.02  # of what an effect explains, by which a quick refit in its place may lie above, to be finished, …
-SHORT = 2.0  # … or times by how much the quick refit of the effect itself stops short of its fit
-NOTHING_LEFT = 0.006  # mean square beyond the noise below which nothing is left
-PROMISES = 3.0  # times the least reduction that counts, which what takes something off that must gain
-SEEN = 0.0025  # of the residual, by which it must fall where nothing seemed to be left: noise gave 0.09 %, effects 0.35
-EXPLAINED = 0.05  # mean square beyond the noise up to which little is left to ask
-MOSTLY = 0.9  # of what noise does not explain: where more is explained, nobody asks what else might be nearest
-ALONE = 0.5  # of what the best candidate explains at first, below which all others leave it without a competitor
-OWN = 0.5  # of what an effect takes off, that must come back where it vanishes
-AS_GOOD = 0.8  # of what the best curve explains to first order, which a further effect must explain, fitted, where …
-MORE_THAN_NOISE = 2.0  # … this mean square over noise is left: as much as the noise again
-HOPELESS = 0.6  # of what noise does not explain: where less is explained, exchanging effects will not do either
 
 Enough = Callable[[str, Misfit, float], bool]
 
 
 def enough_at_first(base: SearchState, name: str, after: Misfit, part: float) -> bool:
     """Whether a first effect explains a good part of what the model, within its tolerances, leaves."""
-    return explained(base.misfit, after) >= part * FURTHER
+    return explained(base.misfit, after) >= part * CRITERIA.further
 
 
 def worth_adding(
@@ -52,10 +34,10 @@ def worth_adding(
     """
     if absorbs_discrepancy(base, before, added, name, after, part):
         return False
-    if explained(before.misfit, after) >= part * FURTHER:
+    if explained(before.misfit, after) >= part * CRITERIA.further:
         return True
-    most = explained(base.misfit, before.misfit) >= HOPELESS
-    return most and explained(base.misfit, after) - explained(base.misfit, before.misfit) >= part * NEEDED
+    most = explained(base.misfit, before.misfit) >= CRITERIA.hopeless
+    return most and explained(base.misfit, after) - explained(base.misfit, before.misfit) >= part * CRITERIA.needed
 
 
 def absorbs_discrepancy(
@@ -67,9 +49,9 @@ def absorbs_discrepancy(
     """
     library = base.model.library
     alike = any(subsystem(library[name]) == subsystem(library[other]) for other in others)
-    if not alike and explained(before.misfit, after) >= part * HOPELESS:
+    if not alike and explained(before.misfit, after) >= part * CRITERIA.hopeless:
         return False
-    least = part * (LAW if alike else ELSEWHERE)
+    least = part * (CRITERIA.law_nearby if alike else CRITERIA.law_elsewhere)
     return before.misfit.total - after.total < least * (base.misfit.total - after.total)
 
 
@@ -78,16 +60,16 @@ def superfluous(base: SearchState, without: SearchState, state: SearchState, nam
     if not material(without.misfit, state.misfit) or absorbs_discrepancy(base, without, others, name, state.misfit):
         return True
     lost = without.misfit.total - state.misfit.total
-    needed = NEEDED * (base.misfit.total - state.misfit.total)
-    return explained(without.misfit, state.misfit) < FURTHER and lost < needed
+    needed = CRITERIA.needed * (base.misfit.total - state.misfit.total)
+    return explained(without.misfit, state.misfit) < CRITERIA.further and lost < needed
 
 
 def near_competitors(base: SearchState, without: SearchState, state: SearchState, name: str) -> SearchState:
     """The state ``without`` an effect, and of its refits those that come near the state with it."""
-    if explained(base.misfit, state.misfit) < HOPELESS:
+    if explained(base.misfit, state.misfit) < CRITERIA.hopeless:
         return replace(without, refits=[])
-    far = DISTANT * (without.misfit.total - state.misfit.total)
-    short = [SHORT * (r.misfit.excess - state.misfit.excess) for r in without.refits if r.name == name]
+    far = CRITERIA.distant * (without.misfit.total - state.misfit.total)
+    short = [CRITERIA.stops_short * (r.misfit.excess - state.misfit.excess) for r in without.refits if r.name == name]
     left = state.misfit.excess + max([far, *short])
     return replace(without, refits=[r for r in without.others(name) if r.misfit.excess < left])
 
@@ -98,12 +80,12 @@ def without_competitor(base: SearchState, final: SearchState, name: str) -> bool
     That is judged by what they explain or, where in the end all is explained, by what they leave.
     """
     own = next((r.misfit for r in base.refits if r.name == name), None)
-    if own is None or base.misfit.total - own.total < MOSTLY * base.misfit.excess:
+    if own is None or base.misfit.total - own.total < CRITERIA.mostly * base.misfit.excess:
         return False
     others = [r.misfit for r in base.others(name)]
-    alone = all(base.misfit.total - at.total < ALONE * (base.misfit.total - own.total) for at in others)
-    little = final.misfit.variance - 1.0 < EXPLAINED
-    return alone or (little and all(at.excess > FAR * (own.excess + at.least) for at in others))
+    alone = all(base.misfit.total - at.total < CRITERIA.alone * (base.misfit.total - own.total) for at in others)
+    little = final.misfit.variance - 1.0 < CRITERIA.explained
+    return alone or (little and all(at.excess > CRITERIA.far * (own.excess + at.least) for at in others))
 
 
 def anything(name: str, after: Misfit, part: float) -> bool:
@@ -129,7 +111,7 @@ def borrowed(before: SearchState, after: SearchState, name: str) -> bool:
     except SimulationError:  # it does not run without it
         return False
     back = sum(float(np.sum(new.costs - old)) for new, old in zip(without, point.costs, strict=True))
-    return back < OWN * (before.misfit.total - after.misfit.total)
+    return back < CRITERIA.own * (before.misfit.total - after.misfit.total)
 
 
 def leaves_most(before: Misfit, after: Misfit, nothing: bool = False) -> bool:
@@ -137,7 +119,7 @@ def leaves_most(before: Misfit, after: Misfit, nothing: bool = False) -> bool:
 
     So little is left that it may be the noise, or, whatever the sensors show, it is ``nothing`` to anybody.
     """
-    left = max(SMALL_UNEXPLAINED * (before.usual - 1.0), NOTHING_LEFT)
+    left = max(CRITERIA.small_unexplained * (before.usual - 1.0), CRITERIA.nothing_left)
     return (before.little or nothing) and after.usual - 1.0 > left
 
 
@@ -147,8 +129,8 @@ def nothing_gained(before: Misfit, after: Misfit) -> bool:
     Segments may agree on it: rounding looks like a resonance to a small light piston.
     """
     gain = before.total - after.total
-    seen = after.squares < (1.0 - SEEN) ** 2 * before.squares
-    return before.usual - 1.0 < NOTHING_LEFT and (gain < PROMISES * before.least or not seen)
+    seen = after.squares < (1.0 - CRITERIA.seen) ** 2 * before.squares
+    return before.usual - 1.0 < CRITERIA.nothing_left and (gain < CRITERIA.promises * before.least or not seen)
 
 
 def decisive(found: SearchResult) -> SearchResult:
@@ -184,7 +166,7 @@ def needless(found: SearchResult, name: str) -> bool:
     if without is None or without is found.base or observed(found.model.library[name]):
         return False
     noise = min(found.final.misfit.squares, float(without.misfit.count))
-    return without.misfit.squares - noise < NOTHING_LEFT * without.misfit.count
+    return without.misfit.squares - noise < CRITERIA.nothing_left * without.misfit.count
 
 
 def vague(found: SearchResult, name: str) -> bool:
@@ -196,4 +178,4 @@ def vague(found: SearchResult, name: str) -> bool:
     share = (without.misfit.total - final.total) / max(base.total - final.total, 1e-9)
     others = [c.name for c in competing_models(name, without, final) if not c.distinguishable]
     own = subsystem(library[name])
-    return share < SUBORDINATE and any(subsystem(library[other]) != own for other in others)
+    return share < CRITERIA.subordinate and any(subsystem(library[other]) != own for other in others)

@@ -1,0 +1,289 @@
+"""The constants of the search: all that decides which fits are made, which effect is named and what is said.
+
+Each has its unit and its reason, and what becomes of benches where it is half or twice as large
+(`benchmarks/criteria.py` measures that). What only a method needs (grids, steps, orders of filters) stands with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+def _constant(value: float, unit: str, reason: str, half: str = "", double: str = "") -> Any:
+    return field(default=value, metadata={"unit": unit, "reason": reason, "half": half, "double": double})
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """Constants by name; ``metadata`` of a field: its ``unit`` and ``reason``, what ``half`` and ``double`` change."""
+
+    # When a fall of the misfit is one, and when nothing is left
+
+    significant: float = _constant(
+        25.0, "σ²", "fall of the sum of squares on segments for fitting that counts: five standard deviations",
+    )  # fmt: skip
+    confirmed: float = _constant(
+        10.0, "σ²", "fall that segments for validation must show; there nothing was chosen from many",
+    )  # fmt: skip
+    visible: float = _constant(5e-4, "share of all values, in σ²", "a smaller fall is a matter of a law's details")
+    agreed: float = _constant(
+        50.0, "variance ratio",
+        "squared size over its scatter between segments: chance and wrong noise gave 44 and less, effects 80 and more",
+    )  # fmt: skip
+    few: float = _constant(
+        0.02, "share of segments",
+        "so many, at least one, turn no verdict, neither by what they leave nor by their gain",
+    )  # fmt: skip
+    noise_missed: float = _constant(0.015, "mean square over noise", "what an estimate of the noise from data may miss")
+    little: float = _constant(1.03, "σ", "up to this residual nothing need be missing")
+    small: float = _constant(1.2, "mean square over noise", "not far off the noise")
+    small_unexplained: float = _constant(
+        0.4, "share of what was left", "that effects may leave where little was left before",
+    )  # fmt: skip
+    nothing_left: float = _constant(0.006, "mean square over noise", "below this, beyond the noise, nothing is left")
+    seen: float = _constant(
+        0.0025, "share of the residual",
+        "by which it must fall where nothing seemed to be left: noise gave 0.09 %, effects 0.35 %",
+    )  # fmt: skip
+    explained: float = _constant(0.05, "mean square over noise", "up to this, beyond the noise, little is left to ask")
+    more_than_noise: float = _constant(
+        2.0, "mean square over noise", "as much as the noise again is left: the shape of a law",
+    )  # fmt: skip
+    far_off: float = _constant(
+        4.0, "mean square over noise", "so far off a model is bent, and a fit need not be finished",
+    )  # fmt: skip
+
+    # What an effect must explain, beside which others
+
+    further: float = _constant(
+        0.25, "share of what is left", "that a further effect must explain, unless it explains a good part of all",
+    )  # fmt: skip
+    needed: float = _constant(
+        0.02, "share of what was explained", "that an effect must explain beside the others to stay",
+    )  # fmt: skip
+    subordinate: float = _constant(
+        0.1, "share of what was explained", "a further effect below it must be told apart to be named",
+    )  # fmt: skip
+    law_nearby: float = _constant(
+        0.0025, "share of what was explained",
+        "what a law that is right to a twentieth leaves for others of its subsystem: 0.05²",
+    )  # fmt: skip
+    law_elsewhere: float = _constant(0.0005, "share of what was explained", "the same for others of other subsystems")
+    promises: float = _constant(
+        3.0, "times the least fall", "what takes something off that nothing asked for must gain",
+    )  # fmt: skip
+    mostly: float = _constant(
+        0.9, "share of what is beyond the noise", "where more is explained, nobody asks what else might be nearest",
+    )  # fmt: skip
+    hopeless: float = _constant(
+        0.6, "share of what is beyond the noise", "where less is explained, exchanging effects will not do either",
+    )  # fmt: skip
+    alone: float = _constant(
+        0.5, "share of what the best explains", "below it all others leave the best candidate without a competitor",
+    )  # fmt: skip
+    own: float = _constant(0.5, "share of what an effect takes off", "that must come back where it vanishes")
+    as_good_as_a_curve: float = _constant(
+        0.8, "share of what the best curve explains",
+        "that a further effect must explain where more than noise is left",
+    )  # fmt: skip
+    far: float = _constant(5.0, "times what the best leaves", "what leaves more comes not near it")
+    distant: float = _constant(
+        0.02, "share of what an effect explains", "by which a quick refit in its place may lie above, to be finished",
+    )  # fmt: skip
+    stops_short: float = _constant(
+        2.0, "times", "the same, by how much the quick refit of the effect itself stops short of its fit",
+    )  # fmt: skip
+
+    # Which candidates are fitted, and to what
+
+    promising: float = _constant(0.04, "share of the best prediction", "from which a candidate is refitted")
+    near: float = _constant(0.93, "share of the best fall", "from which a refit is finished")
+    promised: float = _constant(
+        0.5, "share of what must be explained", "that a quick refit must show to be fitted to the end",
+    )  # fmt: skip
+    same_change: float = _constant(
+        0.9, "collinearity", "of a rival with an effect, from which it cannot leave far more",
+    )  # fmt: skip
+    other_change: float = _constant(
+        0.5, "collinearity", "below which an effect and a rival cannot leave as little as each other by what they do",
+    )  # fmt: skip
+    worse_look: float = _constant(
+        0.2, "share", "by which a look at few segments leaves them more: the fit leads to something worse",
+    )  # fmt: skip
+    same_look: float = _constant(
+        0.02, "share of what is beyond the noise", "by which a look must fall: else the fit leads nowhere else",
+    )  # fmt: skip
+    perhaps: float = _constant(
+        0.2, "times the least fall", "that a prediction must promise, as it often falls far short of a fit",
+    )  # fmt: skip
+    lopsided: float = _constant(
+        4.0, "times", "what the values of one role leave beyond the noise, from which the other has seen little of it",
+    )  # fmt: skip
+    lopsided_beyond: float = _constant(
+        0.1, "mean square over noise", "beyond the noise in that role, from which that is no chance",
+    )  # fmt: skip
+    much_in_a_segment: float = _constant(
+        2.0, "times the median mean square", "what a segment leaves that shows what is missing",
+    )  # fmt: skip
+
+    # Which of two models, and how probable it is
+
+    odds: float = _constant(20.0, "odds", "from which two models are told apart: 95 %")
+    distinct: float = _constant(30.0, "σ²", "the difference of the sums of squares that gives these odds")
+    law_of_the_better: float = _constant(
+        0.05, "share of what the better one leaves", "the same: no law is quite that of the bench",
+    )  # fmt: skip
+    most_power: float = _constant(
+        3.0, "power of the odds", "up to which odds are counted: a fit may have stopped short",
+    )  # fmt: skip
+    unknown_missed: float = _constant(
+        0.01, "mean square over noise",
+        "what an estimate of the noise may miss: with it left, an unknown law is twice as probable",
+    )  # fmt: skip
+    unknown_laws: float = _constant(
+        1e-3, "share of the mean square explained", "the same: no law is quite that of the bench",
+    )  # fmt: skip
+
+    # Numbers of the data sheet
+
+    number_visible: float = _constant(
+        0.01, "share of all values, in σ²", "fall for which a number of the data sheet is named",
+    )  # fmt: skip
+    plausible: float = _constant(
+        3.0, "times the default", "standard deviation of the size of an effect that is a share",
+    )  # fmt: skip
+    rough: float = _constant(0.02, "share of what numbers explain", "what a prediction that far may be off")
+    clear: float = _constant(
+        10.0, "times what names a number", "beyond which a fit need not show what keeping it costs",
+    )  # fmt: skip
+    guessed: int = _constant(
+        4, "numbers", "where more are others the sheet is a guess, and none can be told from the rest",
+    )  # fmt: skip
+
+    # The recording, its noise and its changes
+
+    filtered: float = _constant(
+        0.95, "sampling intervals, or per cent", "by less a sound transducer with its filter is late, too",
+    )  # fmt: skip
+    conversion_order: float = _constant(0.6, "sampling intervals", "by less another order of conversion makes early")
+    same_delay: float = _constant(0.05, "sampling intervals", "by which two delays are one")
+    unnoticed: float = _constant(0.003, "share of the motion", "what leaves less is no disturbance of the drive")
+    same_size: float = _constant(
+        0.005, "share of a fault's size",
+        "until it changes by no more it is sought again: what is left of a gain is an offset",
+    )  # fmt: skip
+    rival: float = _constant(
+        0.8, "share of what the best candidate explains", "from which a fault of the recording may be in its place",
+    )  # fmt: skip
+    glimpsed: float = _constant(
+        0.25, "share of what must be explained",
+        "that a fault of a reading must promise before the model is fitted with it",
+    )  # fmt: skip
+    quieter: float = _constant(0.95, "of the noise before", "what was judged by more is judged again")
+    retimed: float = _constant(0.03, "sampling intervals", "by which a channel is less late than before: the same")
+    agreeing_records: int = _constant(3, "records", "that agree on a small change along a record")
+    records_agree: float = _constant(
+        20.0, "variance ratio", "squared size of that change over its scatter between records",
+    )  # fmt: skip
+    line_stands_out: float = _constant(30.0, "times the power around", "from which a line is none by chance")
+    steps_visible: float = _constant(0.3, "of the noise", "from which steps are no mere rounding of a file")
+    coarser: float = _constant(0.6, "of the pressures' codes", "below which a position has a coarse sensor of its own")
+
+    # What is said
+
+    negligible: float = _constant(
+        0.005, "share of the motion", "no law of a library is that of a bench to five parts in a thousand",
+    )  # fmt: skip
+    immaterial: float = _constant(
+        0.001, "share of the motion, in every channel",
+        "less is nothing to anybody, however little noise the sensors have",
+    )  # fmt: skip
+    vague_drive: float = _constant(1.5, "mean square over noise", "what a drive that is known in part may leave")
+    blamed: float = _constant(
+        0.5, "share of what was to be explained", "where more is left it is not the drive that is wrong",
+    )  # fmt: skip
+    unexplained: float = _constant(
+        0.2, "share of what was to be explained", "more left is no matter of a law's details",
+    )  # fmt: skip
+    unexplained_beside: float = _constant(
+        0.1, "share of what was to be explained",
+        "the same beside an effect: a law left 5 % at most, a proxy 10 to 15 %",
+    )  # fmt: skip
+    unattributed: float = _constant(
+        0.125, "share of what is left", "a curve that explains less of it shows no law that is missing",
+    )  # fmt: skip
+    law_shown: float = _constant(
+        0.5, "share of what is left",
+        "a curve that explains more of it is a law that is missing, where far more than noise is left",
+    )  # fmt: skip
+    right_law: float = _constant(
+        9.0, "mean square over noise", "more is left by no right law: those rightly named left 7.2 at most",
+    )  # fmt: skip
+    alike: float = _constant(
+        0.9, "share of what the best curve explains", "from which another curve tells as well where it is",
+    )  # fmt: skip
+    remainder_seen: float = _constant(
+        0.1, "of the noise", "below which what remains beyond it is that of the noise's own estimate",
+    )  # fmt: skip
+    below_noise: float = _constant(0.9, "σ", "below which the noise model is doubted")
+    coloured: float = _constant(
+        0.1, "correlation", "from which a residual is called coloured: over thousands of samples any model has some",
+    )  # fmt: skip
+    shared: float = _constant(
+        3.0, "times the scatter", "error of an effect's parameter, with what all segments and records share of it",
+    )  # fmt: skip
+    law_error: float = _constant(
+        0.01, "share of a value", "standard error of a parameter for the law that it stands in",
+    )  # fmt: skip
+    shape_error: float = _constant(
+        0.02, "share of a value", "the same of what shapes an effect's law, which others write down otherwise",
+    )  # fmt: skip
+    vague_value: float = _constant(
+        0.3, "share of a value", "standard error from which an interval is sought by what it costs",
+    )  # fmt: skip
+    surest: float = _constant(0.99, "probability", "nothing is said to be surer")
+
+    # How much is done
+
+    most_effects: int = _constant(6, "effects", "together with data sheet and recording")
+    most_swaps: int = _constant(3, "effects", "that take the place of others")
+    most_stuck: int = _constant(2, "rivals", "that change the same and are fitted anew")
+    most_faults: int = _constant(3, "faults", "of the recording")
+    most_sizes: int = _constant(4, "fits", "that the size of a fault is sought in")
+    most_refits: int = _constant(8, "candidates", "that are refitted at first")
+    later_refits: int = _constant(4, "candidates", "once something was added")
+    most_alike: int = _constant(
+        2, "candidates", "of one subsystem then: what its laws left makes all of its effects look promising",
+    )  # fmt: skip
+    most_finished: int = _constant(2, "candidates", "that are refitted from more than one start, and fitted to the end")
+    most_others: int = _constant(
+        3, "candidates", "that are set against the nearest where a quick refit is no sure guide",
+    )  # fmt: skip
+    most_suspects: int = _constant(2, "numbers", "of the data sheet that are tried in the place of one")
+    most_sets: int = _constant(2, "sets of numbers", "in whose place one effect is tried")
+    enough_to_fit: int = _constant(60, "segments", "that do for a first fit")
+    look: int = _constant(20, "segments", "that show where a fit from other values leads")
+    fine_look: float = _constant(0.2, "share of what must be gained", "steps that gain less end such a fit")
+    few_steps: int = _constant(6, "steps", "of a fit that only sets effects against each other")
+    few_gain: float = _constant(2e-3, "share of the sum of squares", "that its steps gain")
+    first_gain: float = _constant(
+        0.02, "share of the sum of squares", "that steps gain while the noise is not known yet",
+    )  # fmt: skip
+    last_steps: int = _constant(8, "steps", "of a fit that begins where a quick refit ended")
+    last_gain: float = _constant(5e-5, "share of the sum of squares", "that its steps gain")
+    shorter: int = _constant(4, "times", "shorter segments from which a fit that is far off begins once more")
+    beyond_bound: int = _constant(
+        8, "values", "of a number at its bound, over all where it may go, from which a fit may begin",
+    )  # fmt: skip
+    most_judged: int = _constant(6, "rounds", "of estimating noise and delays and fitting again")
+    enough_to_score: int = _constant(50, "segments", "that do for a look at candidates")
+    many_probes: int = _constant(8, "groups of probes", "beyond which they are narrowed down on one record")
+    nearest_probes: int = _constant(4, "groups of probes", "that remain")
+    too_far: float = _constant(1.0, "times what is left", "a probe that changes more is no first order")
+    starts_as_well: float = _constant(
+        0.5, "share of the best prediction", "from which another shape is a start as well",
+    )  # fmt: skip
+
+
+CRITERIA = Criteria()
