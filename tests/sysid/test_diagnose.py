@@ -19,6 +19,7 @@ from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, unce
 from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits, varied
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
 from hydraulic_sysid.diagnosis.search.competing_models import CompetingModel
+from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, HeldNumbers, as_filed, relaxed
 from hydraulic_sysid.diagnosis.search.drift import Drift
 from hydraulic_sysid.diagnosis.search.drive_faults import BETWEEN_SAMPLES
@@ -332,8 +333,23 @@ def test_what_no_curve_explains_is_no_other_effect(model, share: float | None, k
 def test_a_curve_that_explains_nothing_is_not_what_it_looks_like(model, share: float, said: str) -> None:
     base = state(model, 30000.0, {})
     found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
-    curve = SimpleNamespace(summary="a leak", variable="time", share=share)
-    assert said in verdict.sentences(found, verdict.Verdict(verdict.OUTSIDE, [], {}, {}), [curve])
+    curve = SimpleNamespace(summary="a leak", variable="time", share=share, subsystem="flow")
+    outside = verdict.Verdict(verdict.OUTSIDE, [], {}, {})
+    assert said in verdict.sentences(found, outside, [curve])
+    where = "flow" if share > 0.3 else "sensor"  # what acts in a plant is smoothed on its way to the position
+    assert verdict.place(found, outside, [curve]) == where
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(0.32, "; nearly as much: a valve over opening (32 %)."), (0.2, "of it. ")]
+)
+def test_other_places_that_explain_nearly_as_much_are_named(model, share: float, said: str) -> None:
+    base = state(model, 30000.0, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
+    flow = [SimpleNamespace(summary="a leak", variable=v, share=0.34, subsystem="flow") for v in ("time", "speed")]
+    valve = SimpleNamespace(summary="a valve", variable="opening", share=share, subsystem="valve")
+    text = verdict.sentences(found, verdict.Verdict(verdict.OUTSIDE, [], {}, {}), [*flow, valve]) + " "
+    assert f"a leak over time, which would explain 34 % of it{said if said[0] == ';' else '. '}" in text
 
 
 @pytest.mark.parametrize(("after", "said"), [(12000.0, "residual falls from"), (36000.0, "residual goes from")])
@@ -618,7 +634,9 @@ def test_progress_tells_what_is_best_and_ends_when_its_time_is_over() -> None:
 
 @pytest.mark.parametrize("moment", ["fitting with valve_deadband", "noise of the records"])
 def test_a_search_that_is_ended_early_gives_the_best_so_far(model, moment: str, monkeypatch) -> None:
-    monkeypatch.setattr(verdict, "RIGHT", 0.0)  # however much is left: who ends a search does not wait for curves
+    at_once = replace(CRITERIA, right_law=0.0)  # however much is left: who ends a search does not wait for curves
+    for module in ("verdict", "diagnosis"):
+        monkeypatch.setattr(f"hydraulic_sysid.diagnosis.search.{module}.CRITERIA", at_once)
     drive = np.repeat(np.random.default_rng(2).uniform(-3.0, 3.0, 20), 250)
     run, draw = Plant(model.with_effect("valve_deadband")).simulate(drive, DT), np.random.default_rng(3)
     noise = {"position": 1e-5, "pressure_a": 2e4, "pressure_b": 2e4}

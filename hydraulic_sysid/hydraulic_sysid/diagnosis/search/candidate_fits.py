@@ -60,8 +60,11 @@ class CandidateFits(Fitting):
         """Whether an effect only delays, by less than a sampling interval: sound sensors and loggers do so, too."""
         return delays(self.given.library[tried.name], tried.refit.model.value, self.split.interval)
 
-    def explore(self, base: SearchState, most: int = CRITERIA.most_refits, anew: bool = True) -> SearchState:
-        """Score all candidates on a state and refit the best; not ``anew``: by the scores beside the same effects."""
+    def explore(self, base: SearchState, most: int | None = None, anew: bool = True) -> SearchState:
+        """Score all candidates on a state and refit the best, no more than so many.
+
+        Where nothing was added yet `Criteria.most_refits`; not ``anew``: by the scores beside the same effects.
+        """
         at = base.linearisation
         known = None if anew else self._seen.get(frozenset(base.model.effects))
         scores = self.scores(base) if known is None else known
@@ -69,7 +72,9 @@ class CandidateFits(Fitting):
             return base
         least = max(CRITERIA.promising * scores[0].reduction, CRITERIA.perhaps * base.misfit.least)
         worth = [s for s in scores if s.reduction > least and not observed(s.effect)]
-        alike = CRITERIA.most_alike if most < CRITERIA.most_refits else most
+        first = CRITERIA.most_refits
+        most = first if most is None else most
+        alike = CRITERIA.most_alike if most < first else most
         best = varied(worth, [s.effect for s in worth], alike)[:most]
         # What rounding explains shows once the initial states have settled with it.
         best += [s for s in scores if observed(s.effect)]
@@ -100,9 +105,10 @@ class CandidateFits(Fitting):
         self.say.watch({"candidates": candidate_table(base, scores, refits, self._added(base.model))})
 
     def refitted(
-        self, base: SearchState, chosen: Sequence[CandidateScore], full: int = CRITERIA.most_finished
+        self, base: SearchState, chosen: Sequence[CandidateScore], full: int | None = None
     ) -> Iterator[CandidateRefit]:
-        """Candidates refitted on a state, in their order; the first of them from all of their starts."""
+        """Candidates refitted on a state, in their order; the first of them, ``full``, from all of their starts."""
+        full = CRITERIA.most_finished if full is None else full
         _ = base.linearisation.columns, base.linearisation.normal  # once, for all that work at the same time
         jobs = results(lambda job: self._refit_from(base, job[1], job[0] < full), enumerate(chosen))
         for one in chosen:
@@ -125,13 +131,14 @@ class CandidateFits(Fitting):
             done = refit_rounded(at, with_fitted_values(base.model.with_effect(name), done.model))
         return CandidateRefit(name, done, misfit(self.split, done.costs, self.prior_cost(done.model)))
 
-    def finish(self, base: SearchState, enough: Enough, promised: float = CRITERIA.promised) -> SearchState | None:
+    def finish(self, base: SearchState, enough: Enough, promised: float | None = None) -> SearchState | None:
         """The best of the refits, fitted to the end; None where none is worth it.
 
         ``enough(name, misfit, part)``: whether an effect's misfit is a part of the way to being worth it.
 
-        :param promised: the part that a quick refit must show to be finished
+        :param promised: the part that a quick refit must show to be finished, usually `Criteria.promised`
         """
+        promised = CRITERIA.promised if promised is None else promised
         # A quick refit keeps what the model was bent to where the effect acts: the sum alone is asked for.
         least = base.misfit.total - base.misfit.least
         worth = [r for r in base.refits if r.misfit.total < least and enough(r.name, r.misfit.summed, promised)]

@@ -42,7 +42,7 @@ class CompetingModel:
 def odds(misfit: Misfit, difference: float) -> float:
     """Of a model that leaves ``misfit`` against one that leaves this ``difference`` more of the sum of squares."""
     needed = CRITERIA.distinct * misfit.variance + CRITERIA.law_of_the_better * misfit.excess
-    return float(CRITERIA.odds ** np.clip(difference / needed, -CRITERIA.most_power, CRITERIA.most_power))
+    return float(CRITERIA.odds ** min(max(difference / needed, -CRITERIA.most_power), CRITERIA.most_power))
 
 
 def competing_models(name: str, without: SearchState, final: Misfit) -> list[CompetingModel]:

@@ -60,8 +60,8 @@ def remainders(split: Split, residual: Sequence[Array]) -> list[Remainder]:
     return found
 
 
-def negligible(found: list[Remainder], share: float = CRITERIA.negligible) -> bool:
-    """Whether what is left is below what any law of a library leaves, or below another ``share`` of the motion."""
+def negligible(found: list[Remainder], share: float) -> bool:
+    """Whether what is left is below a ``share`` of the motion."""
     return bool(found) and all(r.share < share for r in found)
 
 

@@ -41,6 +41,7 @@ DECIDED = (MISSING, COMPLETE, DATA_SHEET, RECORDING)
 
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
+READING = "sensor"  # subsystem of the reading of the position
 IN_LINE = ("valve", "sensor")  # subsystems that a signal passes on its way from the command to what is read
 
 
@@ -228,8 +229,26 @@ def place(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparametric
         drifting = drifting_effect(result)
         if drifting is not None and elsewhere(result, curves) is None:
             return subsystem(result.model.library[drifting])
-        return curves[0].subsystem if curves else None
+        return READING if nowhere(curves) else curves[0].subsystem if curves else None
     return subsystem(result.model.library[result.added[0]]) if result.added else None
+
+
+def nowhere(curves: Sequence[NonparametricCurve]) -> bool:
+    """Whether no curve explains any part of what is left.
+
+    What acts in a plant reaches the position through its mass and its oil, so that some slow curve takes up a part of
+    it; what spoils the reading of the position itself need not be a function of anything.
+    """
+    return bool(curves) and all(c.share <= CRITERIA.unattributed for c in curves)
+
+
+def as_likely(curves: Sequence[NonparametricCurve], best: NonparametricCurve) -> list[NonparametricCurve]:
+    """The best curve of each other subsystem that explains nearly as much as the ``best`` one."""
+    found: dict[str, NonparametricCurve] = {}
+    for c in curves:
+        if c.subsystem != best.subsystem and c.share > CRITERIA.alike * best.share:
+            found.setdefault(c.subsystem, c)
+    return list(found.values())
 
 
 def elsewhere(result: SearchResult, curves: Sequence[NonparametricCurve]) -> NonparametricCurve | None:
@@ -294,12 +313,16 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     else:
         text += f"On validation data the residual is {final:.3g} × noise. "
     best = curves[0] if curves and drift is None else elsewhere(result, curves)
-    if best is not None:
-        over = f"{best.summary} over {best.variable.replace('_', ' ')}"
+    if best is not None and nowhere([best]):
+        text += (
+            f"No curve at any place of the plant would explain {100 * CRITERIA.unattributed:.0f} % of it: "
+            "it may be in how the motion is read."
+        )
+    elif best is not None:
         more = "" if drift is None else " more"
-        looks = f"It looks{more} like {over}, which would explain {100 * best.share:.0f} % of it."
-        nothing = f"No curve at any place of the plant would explain {100 * CRITERIA.unattributed:.0f} % of it."
-        text += looks if best.share > CRITERIA.unattributed else nothing
+        text += f"It looks{more} like {_curve(best)}, which would explain {100 * best.share:.0f} % of it"
+        others = [f"{_curve(c)} ({100 * c.share:.0f} %)" for c in as_likely(curves, best)]
+        text += f"; nearly as much: {_and(others)}." if others else "."
     # Not what the numbers of the data sheet were bent to: they imitate what no effect explains.
     return " ".join([text.strip(), *recording_sentences(result), *aside])
 
@@ -327,6 +350,10 @@ def drift_sentences(result: SearchResult) -> list[str]:
     if result.drift is None or drive_unknown(result) or decisive_drift(result) is not None:
         return []
     return [f"Besides, {_changes(result, result.drift)}."]
+
+
+def _curve(found: NonparametricCurve) -> str:
+    return f"{found.summary} over {found.variable.replace('_', ' ')}"
 
 
 def _changes(result: SearchResult, d: Drift) -> str:

@@ -1,0 +1,140 @@
+"""What becomes of verdicts where a constant of the search is half or twice as large.
+
+    ./bench shell -- python benchmarks/criteria.py [--seed S] [--count N] [--only NAME …] [--out FOLDER]
+
+Benches are of the family that hides anything (and one more each of an unknown law); each is diagnosed once with all
+constants watched: where no comparison comes out differently, half or double would change nothing at all. For the
+others it is diagnosed again. Printed are, per constant, the benches whose verdict is another then (kind, effects,
+numbers or faults), and whether it is right. A share above a half, or odds against one, is not doubled: what it lacks to
+1 is halved or doubled. Diagnoses are quick ones (--full: not). A run continues where it was ended.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from hidden_effects import benches, family, scoring
+from hidden_effects.watched_number import Label, WatchedNumber
+from hydraulic_sysid.diagnosis.search.criteria import CRITERIA, Criteria
+
+ROOT = Path(__file__).resolve().parents[1]
+OUT = ROOT / "runs" / "criteria"
+WHICH = ("half", "double")
+ONLY_SAID = ("shared", "law_error", "shape_error", "vague_value", "surest")
+"""Constants of the errors that are stated: no verdict follows from them."""
+
+
+def half_and_double(name: str) -> dict[str, float]:
+    """What a constant is made."""
+    value = getattr(CRITERIA, name)
+    if isinstance(value, int):
+        return {"half": max(value // 2, 1), "double": 2 * value}
+    if 0.5 <= value < 1.0:
+        return {"half": 1.0 - 2.0 * (1.0 - value) if value > 0.5 else 0.25, "double": 1.0 - 0.5 * (1.0 - value)}
+    if 1.0 < value < 1.5 and name in ("little", "small"):
+        return {"half": 1.0 + 0.5 * (value - 1.0), "double": 1.0 + 2.0 * (value - 1.0)}
+    return {"half": 0.5 * value, "double": 2.0 * value}
+
+
+def run(task: tuple[str, Path, bool, Label | None]) -> dict[str, Any]:
+    """One bench diagnosed with one constant changed, or with all of them watched; in a process of its own."""
+    from hydraulic_sim.model_file import load_model
+    from hydraulic_sysid.data.records import read_all
+    from hydraulic_sysid.data.results import plain
+    from hydraulic_sysid.diagnosis.search import diagnose
+
+    name, place, quick, changed = task
+    noted: set[Label] = set()
+    if changed is not None:
+        object.__setattr__(CRITERIA, changed[0], half_and_double(changed[0])[changed[1]])
+    else:
+        for field in fields(Criteria):
+            value = getattr(CRITERIA, field.name)
+            if isinstance(value, float) and field.name not in ONLY_SAID:
+                others = {(field.name, which): one for which, one in half_and_double(field.name).items()}
+                object.__setattr__(CRITERIA, field.name, WatchedNumber(value, others, noted))
+
+    records, model = read_all(sorted(place.glob("*.csv.gz"))), load_model(place / "model.yaml")
+    try:
+        result = plain(diagnose(model, records, quick=quick).result)
+    except ArithmeticError as error:
+        return {"bench": name, "said": f"failed: {error}", "right": False, "noted": sorted(noted)}
+    marks = scoring.judge(json.loads((place / "answer.json").read_text()), result)
+    return {"bench": name, "said": said(result), "right": bool(marks["verdict_right"]), "noted": sorted(noted)}
+
+
+def said(result: dict[str, Any]) -> str:
+    """Verdict, effects, numbers and faults in a line."""
+    names = [e["name"] for e in result["effects"] if e["added"]]
+    names += [d["key"] for d in result.get("data_sheet", ())]
+    names += [f["name"] for f in result.get("recording", {}).get("faults", ())]
+    return " ".join([result["verdict"]["kind"], *sorted(names)])
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1, metavar="S")
+    parser.add_argument("--count", type=int, default=5, metavar="N", help="benches that hide anything")
+    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="constants")
+    parser.add_argument("--full", action="store_true")
+    parser.add_argument("--watched", action="store_true", help="only in how many benches any decision would be another")
+    parser.add_argument("--processes", type=int, default=2, metavar="N")
+    parser.add_argument("--out", type=Path, default=OUT, metavar="FOLDER")
+    options = parser.parse_args(argv)
+    chosen = [*family.draw(options.count, [options.seed]), *family.draw(1, [options.seed], "unknown")]
+    places = {b.name: benches.write(b, options.out / "benches") for b in chosen}
+    kept = options.out / "found.jsonl"
+    known = {_key(one): one for one in map(json.loads, kept.read_text().splitlines())} if kept.exists() else {}
+
+    def all_of(tasks: list[tuple[str, Label | None]]) -> dict[Any, dict[str, Any]]:
+        missing = [task for task in tasks if task not in known]
+        left = [(name, places[name], not options.full, changed) for name, changed in missing]
+        with multiprocessing.get_context("spawn").Pool(options.processes, maxtasksperchild=1) as pool:
+            for (name, _, _, changed), one in zip(left, pool.imap(run, left), strict=True):
+                known[name, changed] = one | {"changed": changed}
+                with kept.open("a") as file:
+                    file.write(json.dumps(known[name, changed]) + "\n")
+                print(name, *(changed or ("watched",)), "→", one["said"], flush=True)
+        return {task: known[task] for task in tasks}
+
+    watched = all_of([(name, None) for name in places])
+    names = [f.name for f in fields(Criteria) if not options.only or f.name in options.only]
+    if options.watched:
+        for name in names:
+            print(name, *(sum([name, w] in map(list, one["noted"]) for one in watched.values()) for w in WHICH))
+        return 0
+    again = [
+        (bench, (name, which))
+        for name in names
+        for which in WHICH
+        for bench in places
+        if name not in ONLY_SAID
+        and (isinstance(getattr(CRITERIA, name), int) or [name, which] in map(list, watched[bench, None]["noted"]))
+    ]
+    print(f"{len(again)} of {2 * len(names) * len(places)} are diagnosed again", flush=True)
+    done = all_of(again)
+    right = sum(one["right"] for one in watched.values())
+    print(f"\nas they are: {right} of {len(places)} right")
+    for name in names:
+        for which, value in half_and_double(name).items():
+            others = [
+                f"{bench}: {one['said']} ({'right' if one['right'] else 'wrong'})"
+                for (bench, changed), one in done.items()
+                if changed == (name, which) and one["said"] != watched[bench, None]["said"]
+            ]
+            print(f"{name} {value:g}: {'; '.join(others) or 'nothing'}")
+    return 0
+
+
+def _key(one: dict[str, Any]) -> tuple[str, Label | None]:
+    return one["bench"], tuple(one["changed"]) if one["changed"] else None
+
+
+if __name__ == "__main__":
+    sys.exit(main())
