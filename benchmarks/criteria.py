@@ -2,11 +2,11 @@
 
     ./bench shell -- python benchmarks/criteria.py [--seed S] [--count N] [--only NAME …] [--out FOLDER]
 
-Benches are of the family that hides anything (and one more each of an unknown law); each is diagnosed once with all
-constants watched: where no comparison comes out differently, half or double would change nothing at all. For the
-others it is diagnosed again. Printed are, per constant, the benches whose verdict is another then (kind, effects,
-numbers or faults), and whether it is right. A share above a half, or odds against one, is not doubled: what it lacks to
-1 is halved or doubled. Diagnoses are quick ones (--full: not). A run continues where it was ended.
+Benches are of the family that hides anything, and one of an unknown law (--what: all of one kind). Each is diagnosed
+once with all constants watched: where no comparison comes out differently, half or double would change nothing at all.
+For the others it is diagnosed again. Printed are, per constant, the benches whose verdict is another then (kind,
+effects, numbers or faults), and whether it is right. Of a share above a half what it lacks to 1 is halved or doubled,
+of a residual over noise what it has beyond 1. Diagnoses are quick ones (--full: not). A run continues where it ended.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def run(task: tuple[str, Path, bool, Label | None]) -> dict[str, Any]:
     from hydraulic_sysid.diagnosis.search import diagnose
 
     name, place, quick, changed = task
-    noted: set[Label] = set()
+    noted, lost = set[Label](), set[Label]()
     if changed is not None:
         object.__setattr__(CRITERIA, changed[0], half_and_double(changed[0])[changed[1]])
     else:
@@ -58,15 +58,13 @@ def run(task: tuple[str, Path, bool, Label | None]) -> dict[str, Any]:
             value = getattr(CRITERIA, field.name)
             if isinstance(value, float) and field.name not in ONLY_SAID:
                 others = {(field.name, which): one for which, one in half_and_double(field.name).items()}
-                object.__setattr__(CRITERIA, field.name, WatchedNumber(value, others, noted))
+                object.__setattr__(CRITERIA, field.name, WatchedNumber(value, others, noted, lost))
 
     records, model = read_all(sorted(place.glob("*.csv.gz"))), load_model(place / "model.yaml")
-    try:
-        result = plain(diagnose(model, records, quick=quick).result)
-    except ArithmeticError as error:
-        return {"bench": name, "said": f"failed: {error}", "right": False, "noted": sorted(noted)}
+    result = plain(diagnose(model, records, quick=quick).result)
     marks = scoring.judge(json.loads((place / "answer.json").read_text()), result)
-    return {"bench": name, "said": said(result), "right": bool(marks["verdict_right"]), "noted": sorted(noted)}
+    right = bool(marks["verdict_right"])
+    return {"bench": name, "said": said(result), "right": right, "noted": sorted(noted), "lost": sorted(lost - noted)}
 
 
 def said(result: dict[str, Any]) -> str:
@@ -80,14 +78,16 @@ def said(result: dict[str, Any]) -> str:
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1, metavar="S")
-    parser.add_argument("--count", type=int, default=5, metavar="N", help="benches that hide anything")
+    parser.add_argument("--count", type=int, default=5, metavar="N", help="benches, and one of an unknown law")
+    parser.add_argument("--what", choices=tuple(family.WHAT), help="what all of them hide instead of anything")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="constants")
     parser.add_argument("--full", action="store_true")
     parser.add_argument("--watched", action="store_true", help="only in how many benches any decision would be another")
     parser.add_argument("--processes", type=int, default=2, metavar="N")
     parser.add_argument("--out", type=Path, default=OUT, metavar="FOLDER")
     options = parser.parse_args(argv)
-    chosen = [*family.draw(options.count, [options.seed]), *family.draw(1, [options.seed], "unknown")]
+    chosen = family.draw(options.count, [options.seed], options.what)
+    chosen += [] if options.what else family.draw(1, [options.seed], "unknown")
     places = {b.name: benches.write(b, options.out / "benches") for b in chosen}
     kept = options.out / "found.jsonl"
     known = {_key(one): one for one in map(json.loads, kept.read_text().splitlines())} if kept.exists() else {}
@@ -107,7 +107,7 @@ def main(argv: list[str] | None = None) -> int:
     names = [f.name for f in fields(Criteria) if not options.only or f.name in options.only]
     if options.watched:
         for name in names:
-            print(name, *(sum([name, w] in map(list, one["noted"]) for one in watched.values()) for w in WHICH))
+            print(name, *(sum(_noted(one, name, which) for one in watched.values()) for which in WHICH))
         return 0
     again = [
         (bench, (name, which))
@@ -115,7 +115,7 @@ def main(argv: list[str] | None = None) -> int:
         for which in WHICH
         for bench in places
         if name not in ONLY_SAID
-        and (isinstance(getattr(CRITERIA, name), int) or [name, which] in map(list, watched[bench, None]["noted"]))
+        and (isinstance(getattr(CRITERIA, name), int) or _noted(watched[bench, None], name, which))
     ]
     print(f"{len(again)} of {2 * len(names) * len(places)} are diagnosed again", flush=True)
     done = all_of(again)
@@ -130,6 +130,11 @@ def main(argv: list[str] | None = None) -> int:
             ]
             print(f"{name} {value:g}: {'; '.join(others) or 'nothing'}")
     return 0
+
+
+def _noted(one: dict[str, Any], name: str, which: str) -> bool:
+    """Whether a decision on this bench would be another, or may be."""
+    return (name, which) in {tuple(label) for label in (*one["noted"], *one["lost"])}
 
 
 def _key(one: dict[str, Any]) -> tuple[str, Label | None]:

@@ -44,6 +44,13 @@ def _said(result: dict[str, Any]) -> list[str]:
     return [d["key"] for d in result.get("data_sheet", ())] + faults + ["spikes"] * bool(recording.get("spikes"))
 
 
+def _or(result: dict[str, Any]) -> list[str]:
+    """What a verdict says may be in the place of a number or a fault."""
+    numbers = [other["key"] for d in result.get("data_sheet", ()) for other in d.get("alternatives", ())]
+    faults = result.get("recording", {}).get("faults", ())
+    return numbers + [other["name"] for f in faults for other in f.get("alternatives", ())]
+
+
 def _tied(result: dict[str, Any]) -> list[str]:
     """Faults of the recording that are named as what may be in an effect's place."""
     return [f["name"] for f in result.get("recording", {}).get("instead", ())]
@@ -98,6 +105,8 @@ def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
     marks["probability"] = result["verdict"].get("probability")
     # A tie is right where the truth is among what it names.
     marks["true_among"] = kind == TIE and bool(true) and set(true) <= {*names, *result["verdict"].get("effects", ())}
+    if answer["kind"] in (DATUM, RECORDING) and kind in (DATA_SHEET, RECORDING):
+        marks["true_among"] = any(name in _or(result) for name in answer["said"][0])
     marks["verdict_right"] = bool(marks[RIGHT[answer["kind"]]]) or marks["true_among"]
     return marks
 

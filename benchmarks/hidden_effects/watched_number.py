@@ -15,14 +15,14 @@ Label = tuple[str, str]
 class WatchedNumber:
     """Stands for a constant: arithmetic goes on with all it might be, a comparison notes in ``noted`` whose is another.
 
-    Where it is turned into a plain number (an index, an array), all that it might be is noted: nothing is known then.
+    Where it is turned into a plain number (in an array, a document), that is noted in ``lost``: nothing is known then.
     """
 
     __array_ufunc__ = None
     __hash__ = None  # type: ignore[assignment]
 
-    def __init__(self, value: float, others: dict[Label, float], noted: set[Label]) -> None:
-        self.value, self.others, self.noted = value, others, noted
+    def __init__(self, value: float, others: dict[Label, float], noted: set[Label], lost: set[Label]) -> None:
+        self.value, self.others, self.noted, self.lost = value, others, noted, lost
 
     def _with(self, other: Any, do: Callable[[Any, Any], Any]) -> WatchedNumber:
         theirs = other if isinstance(other, WatchedNumber) else None
@@ -32,7 +32,7 @@ class WatchedNumber:
             label: do(self.others.get(label, self.value), plain if theirs is None else theirs.others.get(label, plain))
             for label in labels
         }
-        return WatchedNumber(do(self.value, plain), found, self.noted)
+        return WatchedNumber(do(self.value, plain), found, self.noted, self.lost)
 
     def _decided(self, other: Any, do: Callable[[Any, Any], Any]) -> Any:
         done = self._with(other, do)
@@ -40,7 +40,7 @@ class WatchedNumber:
         return done.value
 
     def _plain(self) -> float:
-        self.noted.update(self.others)
+        self.lost.update(self.others)
         return self.value
 
     def __float__(self) -> float:

@@ -15,6 +15,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
+from hydraulic_sysid.data.records.channels import CHAMBERS
 from hydraulic_sysid.diagnosis.search import DiagnosisError, add, diagnose, uncertainty, verdict, worth
 from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits, varied
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures, between, candidates, inverse, probes
@@ -740,6 +741,40 @@ def test_one_effect_is_named_before_a_fault_and_a_number_that_explain_the_same_t
     assert done.added == (["pressure_offset"] if named else [])
     assert bool(done.faults) is bool(done.moved) is not named
     assert [f.hypothesis.name for f in done.together_instead.faults] == (["pressure_a_gain"] if named else [])
+
+
+@pytest.mark.parametrize(
+    ("left", "numbers", "tied"),
+    [
+        (2999.0, 1, True),  # as little
+        (3100.0, 1, False),  # clearly more
+        (2999.0, 2, False),  # as little, with more of the data sheet wrong
+    ],
+)
+def test_a_gain_of_the_other_reading_that_says_the_same_is_named_beside_a_gain(
+    model: Model, monkeypatch: pytest.MonkeyPatch, left: float, numbers: int, tied: bool
+) -> None:
+    found, _ = with_gain_and_supply(model, 3000.0)
+    record = Record("r", DT * np.arange(2000), DT, {c: np.zeros(2000) for c in ("drive", "position", *CHAMBERS)})
+    whole = Split(cut([record], "hydraulic", 0.5), [])
+    scaled = replace(whole, segments=found.faults[0].on(whole.segments))
+    search, seen = object.__new__(Search), []
+    search.split, search.say, search._last = scaled, lambda text: None, FitSettings()  # type: ignore[assignment]
+
+    def fitted(self: Search, model: Model, settings: FitSettings) -> SearchState:
+        seen.append([reading.gain for reading in self.split.segments[0].readings])
+        return state(model, left, {})
+
+    monkeypatch.setattr(Search, "state", fitted)
+    monkeypatch.setattr(Search, "fewest_moved", lambda self, final, strict: (final, [found.moved[0]] * numbers))
+    monkeypatch.setattr("hydraulic_sysid.diagnosis.search.recording_fits.resized", lambda at, fault: fault)
+    done = search.with_other_gains(found)
+    assert search.split is scaled and seen == [pytest.approx([0.0, 0.0, -0.05])], "the other one, in its place"
+    said = "pressure_a reads 5.0 % too much (or pressure_b reads 5.0 % too little, which these data cannot distinguish)"
+    assert (done.faults[0].text == said) is tied
+    named = [e.faults for e in explanations(done, verdict.judge(done)) if e.named]
+    assert named == [("pressure_a_gain",), *([("pressure_b_gain",)] if tied else [])]
+    assert search.with_other_gains(replace(found, moved=())).faults == found.faults, "the data sheet decides"
 
 
 def test_a_fault_and_a_number_that_explain_the_same_together_are_named_beside_the_effect(model: Model) -> None:

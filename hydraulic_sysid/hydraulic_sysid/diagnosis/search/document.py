@@ -152,6 +152,7 @@ def _fault(found: RecordingFault) -> dict[str, Any]:
         "standard_error": found.standard_error,
         "text": found.text,
         "remedy": found.hypothesis.remedy,
+        "alternatives": [_fault(other) for other in found.alternatives],
     }
 
 

@@ -103,6 +103,10 @@ def _known(result: SearchResult, verdict: Verdict) -> dict[What, tuple[float, bo
     if several.faults:
         keys, names = tuple(d.key for d in several.numbers), tuple(f.hypothesis.name for f in several.faults)
         found.setdefault((effects[:-1], keys, names), (1.0, tie))
+    for fault in result.faults:
+        rest = tuple(name for name in faults if name != fault.hypothesis.name)
+        for gain in fault.alternatives:
+            found.setdefault((effects, numbers, (*rest, gain.hypothesis.name)), (1.0, True))
     for d in result.moved:
         rest = tuple(key for key in numbers if key != d.key)
         for number in d.alternatives:

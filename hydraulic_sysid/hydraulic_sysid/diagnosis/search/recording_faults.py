@@ -96,12 +96,16 @@ HYPOTHESES = (
 
 @dataclass(frozen=True)
 class RecordingFault:
-    """A fault, its ``size`` ± ``standard_error`` [``unit``], and by how much it lowers the sum of squares."""
+    """A fault, its ``size`` ± ``standard_error`` [``unit``], and by how much it lowers the sum of squares.
+
+    ``alternatives``: other faults that would explain the same.
+    """
 
     hypothesis: Hypothesis | DriveHypothesis
     size: float
     standard_error: float
     reduction: float
+    alternatives: tuple[RecordingFault, ...] = ()
 
     def applied(self, at: Linearisation) -> list[Segments]:
         """The linearisation's segments, their records taken to have it."""
@@ -145,11 +149,24 @@ class RecordingFault:
 
     @property
     def text(self) -> str:
-        """In words, with its size."""
+        """In words, with its size, and with what may be in its place."""
         late, much = ("late", "much") if self.size > 0.0 else ("early", "little")
         corner = f"{1.0 / (2.0 * np.pi * abs(self.size)):.3g} Hz" if self.unit == "s" and self.size else ""
         size = percent(abs(self.size)) if self.unit == "1" else f"{1e3 * abs(self.size):.3g} m{self.unit}"
-        return self.hypothesis.text.format(size=size, late=late, much=much, corner=corner)
+        own = self.hypothesis.text.format(size=size, late=late, much=much, corner=corner)
+        same = " and ".join(one.text for one in self.alternatives)
+        return f"{own} (or {same}, which these data cannot distinguish)" if same else own
+
+
+def other_gains(fault: RecordingFault, channels: AbstractSet[str]) -> list[RecordingFault]:
+    """Gains of the other readings that would make up for a gain; none of a fault of another kind.
+
+    ``channels``: of all records.
+    """
+    if isinstance(fault.hypothesis, DriveHypothesis) or fault.hypothesis.what != "gain":
+        return []
+    others = [h for h in HYPOTHESES if h.what == "gain" and h is not fault.hypothesis and h.shown_by(channels)]
+    return [replace(fault, hypothesis=h, size=-fault.size, alternatives=()) for h in others]
 
 
 def without_small_delays(segments: Segments) -> Segments:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -16,7 +17,7 @@ from .drive_faults import costs_with
 from .fitting import Task, worse
 from .holdout import Split
 from .misfit import explained, material, misfit
-from .recording_faults import RecordingFault, recording_faults, resized
+from .recording_faults import RecordingFault, other_gains, recording_faults, resized
 from .remainder import negligible
 from .search_state import FaultFit, SearchResult, SearchState, Together
 from .worth import enough_at_first, leaves_most
@@ -240,6 +241,30 @@ class RecordingFits(DataSheetFits):
             pass
         self.split = before
         return found
+
+    def with_other_gains(self, found: SearchResult) -> SearchResult:
+        """With the gains of other readings that say the same as one that was found, beside as many other numbers.
+
+        Where the data sheet is in doubt anyway, one transducer that reads too much is the other one that reads too
+        little, with other areas and another supply.
+        """
+        if found.added or not found.moved:
+            return found
+        faults, before = list(found.faults), self.split
+        for i, fault in enumerate(faults):
+            same = []
+            for other in other_gains(fault, set(before.channels)):
+                self.say(f"fitting with: {other.text}")
+                undone = replace(fault, size=-fault.size).on(before.segments)
+                self.split = replace(before, segments=other.on(undone))
+                with suppress(SimulationError):
+                    state = self.state(relaxed(found.final.model), self._last)
+                    done, moved = self.fewest_moved(state, None)
+                    if len(moved) <= len(found.moved) and not worse(done.misfit, found.final.misfit):
+                        same.append(resized(done.linearisation, other))
+            faults[i] = replace(fault, alternatives=tuple(same))
+        self.split = before
+        return replace(found, faults=tuple(faults))
 
     def as_good(self, found: SearchResult, model: Model, fault: RecordingFault) -> FaultFit | None:
         """A model with a fault of the recording, if together they explain what was found."""

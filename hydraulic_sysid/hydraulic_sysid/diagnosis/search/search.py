@@ -81,7 +81,7 @@ class Search(RecordingFits):
             searched = self.rivals_begun_anew(decisive(self.searched()))
             concluded = self.rivals_as_filed(self.concluded(searched, others=not self.quick))
             concluded = self.set_against_effect(self.set_against_faults(concluded))
-            found = accidents_named(self.by_force(concluded))
+            found = accidents_named(self.by_force(self.with_other_gains(concluded)))
             if found.added and found.base.scores:  # not those beside the effects that were found last
                 self._show(found.base, found.base.scores, found.base.refits)
             return self.with_drift(found)
