@@ -15,7 +15,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
-from hydraulic_sysid.diagnosis.search import recording_fits, search
+from hydraulic_sysid.diagnosis.search import data_sheet_fits, recording_fits, search
 from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits
 from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
 from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
@@ -195,6 +195,25 @@ def test_an_effect_that_leaves_less_than_the_whole_data_sheet_is_the_verdict(mod
     assert OneWrongNumber(model, less=400.0).named == (["friction_asymmetry"], [])
     assert OneWrongNumber(model, less=40.0).named == ([], ["piston_area_b"])  # it may be either
     assert OneWrongNumber(model, less=400.0, agreed=False).named == ([], ["piston_area_b"])
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_an_effect_whose_gain_is_not_its_own_is_nothing_in_the_place_of_a_number(
+    model: Model, own: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    number = Deviation("supply_pressure", 14.0e6, 14.1e6, 2e4, 900.0)
+    fits = object.__new__(DataSheetFits)
+    fits.given, fits.say, fits._last = model, lambda text: None, FitSettings()  # type: ignore[assignment]
+    loaded, at = model.with_effect("constant_load"), cast(Linearisation, None)
+    done = SearchState(model, at, left(40_000.0), [])
+    refit = CandidateRefit("constant_load", Refit(loaded, []), left(40_000.0))
+    without = SearchState(model, at, left(90_000.0), [], [refit])
+    monkeypatch.setattr(DataSheetFits, "explore", lambda *_: without)
+    monkeypatch.setattr(DataSheetFits, "left_on_few", lambda *_: 1000.0)
+    monkeypatch.setattr(DataSheetFits, "looked_at", lambda *_: 1000.0)
+    monkeypatch.setattr(DataSheetFits, "state", lambda self, model, settings: replace(done, model=model))
+    monkeypatch.setattr(data_sheet_fits, "borrowed", lambda before, after, name: not own)
+    assert len(fits.in_place_of(without, done, [number], [number])[1]) == int(own)
 
 
 def test_what_a_bent_model_hides_shows_beside_the_values_of_its_file(model: Model) -> None:

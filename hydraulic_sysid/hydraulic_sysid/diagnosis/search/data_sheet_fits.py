@@ -23,7 +23,7 @@ from .number_sets import sets_of_one_effect
 from .search_state import SearchResult, SearchState
 from .spectral_lines import record_features
 from .uncertainty import parameter_errors
-from .worth import nothing_gained
+from .worth import borrowed, nothing_gained
 
 
 class DataSheetFits(CandidateFits):
@@ -198,7 +198,7 @@ class DataSheetFits(CandidateFits):
                 continue
             with suppress(SimulationError):
                 reached = self.state(model, self._last)
-                if not worse(reached.misfit, done.misfit):
+                if not (worse(reached.misfit, done.misfit) or borrowed(without, reached, r.name)):
                     found.append(reached)
         return without, found
 
