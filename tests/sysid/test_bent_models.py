@@ -27,6 +27,7 @@ from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit, refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
+from hydraulic_sysid.diagnosis.search.number_sets import StandIns
 from hydraulic_sysid.diagnosis.search.recording_faults import RecordingFault
 from hydraulic_sysid.diagnosis.search.recording_fits import RecordingFits
 from hydraulic_sysid.diagnosis.search.score_test import score
@@ -195,6 +196,20 @@ def test_an_effect_that_leaves_less_than_the_whole_data_sheet_is_the_verdict(mod
     assert OneWrongNumber(model, less=400.0).named == (["friction_asymmetry"], [])
     assert OneWrongNumber(model, less=40.0).named == ([], ["piston_area_b"])  # it may be either
     assert OneWrongNumber(model, less=400.0, agreed=False).named == ([], ["piston_area_b"])
+
+
+def test_what_effects_may_stand_for_follows_from_the_sensitivities(model: Model) -> None:
+    """An offset of the position for both dead volumes, offsets of the pressures for the supply; nothing for an area."""
+    off = {"dead_volume_a": 1.1, "dead_volume_b": 0.9, "supply_pressure": 1.02, "piston_area_a": 1.02}
+    for key in off:
+        value = model.value(key)
+        model = model.with_entry(key, free=True, bounds=(0.5 * value, 2.0 * value))
+    fits = CandidateFits.of(model, [swept(model)], [], FitSettings(), lambda text: None)
+    at = Linearisation.of(model, fits.split)
+    found = StandIns.of(at, {k: times * model.value(k) for k, times in off.items()}, record_features(at))
+    enough = CRITERIA.significant
+    assert [key for key in off if found.any_for(key, enough)] == ["dead_volume_a", "dead_volume_b", "supply_pressure"]
+    assert ("dead_volume_a", "dead_volume_b") in found.sets(freedom=10.0)
 
 
 @pytest.mark.parametrize("own", [True, False])

@@ -767,13 +767,15 @@ def test_a_gain_of_the_other_reading_that_says_the_same_is_named_beside_a_gain(
 
     monkeypatch.setattr(Search, "state", fitted)
     monkeypatch.setattr(Search, "fewest_moved", lambda self, final, strict: (final, [found.moved[0]] * numbers))
+    effects = [state(model.with_effect("pressure_offset"), left, {})] if tied else []
+    monkeypatch.setattr(Search, "in_place_of", lambda *_: (found.base, effects))
     monkeypatch.setattr("hydraulic_sysid.diagnosis.search.recording_fits.resized", lambda at, fault: fault)
     done = search.with_other_gains(found)
     assert search.split is scaled and seen == [pytest.approx([0.0, 0.0, -0.05])], "the other one, in its place"
-    said = "pressure_a reads 5.0 % too much (or pressure_b reads 5.0 % too little, which these data cannot distinguish)"
-    assert (done.faults[0].text == said) is tied
-    named = [e.faults for e in explanations(done, verdict.judge(done)) if e.named]
-    assert named == [("pressure_a_gain",), *([("pressure_b_gain",)] if tied else [])]
+    same = "or pressure_b reads 5.0 % too little, or pressure_offset is missing, which these data cannot distinguish"
+    assert done.faults[0].text == "pressure_a reads 5.0 % too much" + (f" ({same})" if tied else "")
+    named = [(*e.effects, *e.faults) for e in explanations(done, verdict.judge(done)) if e.named]
+    assert named == [("pressure_a_gain",), *([("pressure_b_gain",), ("pressure_offset",)] if tied else [])]
     assert search.with_other_gains(replace(found, moved=())).faults == found.faults, "the data sheet decides"
 
 

@@ -19,7 +19,7 @@ from .criteria import CRITERIA
 from .data_sheet import Deviation, HeldNumbers, least_cost, relaxed, restored, stretched, with_error
 from .fitting import worse
 from .misfit import explained, reduction
-from .number_sets import sets_of_one_effect
+from .number_sets import StandIns
 from .search_state import SearchResult, SearchState
 from .spectral_lines import record_features
 from .uncertainty import parameter_errors
@@ -62,12 +62,18 @@ class DataSheetFits(CandidateFits):
             return found
         strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
         done, moved = self.fewest_moved(final, strict if final is base else None)
-        tried = self.of_one_effect(done, moved) if others else []
+        stand_ins = self.stand_ins(done, moved) if others and len(moved) > (0 if found.added else 1) else None
+        tried = stand_ins.sets(done.misfit.freedom)[: CRITERIA.most_sets] if stand_ins is not None else []
         for keys in tried:
             simpler = self.simpler(found, strict, done, moved, keys)
             if simpler is not None:
                 return simpler
-        if not found.added:  # beside an effect, another in the place of one number is no answer that anybody asks for
+        if found.added:
+            enough = least_cost(done.misfit.count, done.misfit.variance)
+            doubtful = [d for d in moved if stand_ins is not None and stand_ins.any_for(d.key, enough)]
+            instead = {d.key: self.in_place_of(None, done, [d], moved)[1] for d in doubtful}
+            moved = [replace(d, instead=_names(instead.get(d.key, []), done)) for d in moved]
+        else:
             places = [self.in_place_of(strict, done, [d], moved) for d in moved]
             every = [(state, i) for i, (_, states) in enumerate(places) for state in states]
             best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
@@ -81,8 +87,7 @@ class DataSheetFits(CandidateFits):
                     moved=tuple(d for i, d in enumerate(moved) if i != place),
                 )  # fmt: skip
             moved = [
-                replace(d, instead=tuple(new_effect(s, strict) for s in states))
-                for d, (_, states) in zip(moved, places, strict=True)
+                replace(d, instead=_names(states, strict)) for d, (_, states) in zip(moved, places, strict=True)
             ]
             shared = [tuple(d.key for d in moved if name in d.instead) for one in moved for name in one.instead]
             for keys in dict.fromkeys(shared):
@@ -94,14 +99,10 @@ class DataSheetFits(CandidateFits):
             misfits = {**misfits, next(reversed(misfits)): done.misfit}
         return replace(found, base=strict, final=done, misfits=misfits, moved=tuple(moved))
 
-    def of_one_effect(self, done: SearchState, moved: Sequence[Deviation]) -> list[tuple[str, ...]]:
-        """Sets of the numbers ``moved``, each of which one effect may stand for: the likeliest that are tried."""
-        if len(moved) < 2:
-            return []
-        self.say("looking for one effect that does what several numbers do")
-        at = done.linearisation
-        nominal = {d.key: d.nominal for d in moved}
-        return sets_of_one_effect(at, nominal, record_features(at), done.misfit.freedom)[: CRITERIA.most_sets]
+    def stand_ins(self, done: SearchState, moved: Sequence[Deviation]) -> StandIns:
+        """What the library's effects may stand for of the numbers ``moved``."""
+        self.say("looking for effects that do what wrong numbers do")
+        return StandIns.of(done.linearisation, {d.key: d.nominal for d in moved}, record_features(done.linearisation))
 
     def simpler(
         self,
@@ -186,7 +187,7 @@ class DataSheetFits(CandidateFits):
         most = (1.0 + CRITERIA.worse_look) * self.left_on_few(done) if near else 0.0
         for r in near:
             own = {p.name: r.refit.model.value(f"{r.name}.{p.name}") for p in r.refit.model.library[r.name].parameters}
-            self.say(f"{r.name} in the place of {' and '.join(d.key for d in taken)}")
+            self.say(f"{r.name} in the place of {' and '.join(d.key for d in taken) or 'a fault'}")
             # Without the numbers the other values were bent to imitate them.
             unbent = restored(done.model, self.given, others).with_effect(r.name, own)
             looks = []
@@ -201,6 +202,10 @@ class DataSheetFits(CandidateFits):
                 if not (worse(reached.misfit, done.misfit) or borrowed(without, reached, r.name)):
                     found.append(reached)
         return without, found
+
+
+def _names(states: Sequence[SearchState], before: SearchState) -> tuple[str, ...]:
+    return tuple(new_effect(state, before) for state in states)
 
 
 def new_effect(state: SearchState, before: SearchState) -> str:

@@ -153,6 +153,7 @@ def _fault(found: RecordingFault) -> dict[str, Any]:
         "text": found.text,
         "remedy": found.hypothesis.remedy,
         "alternatives": [_fault(other) for other in found.alternatives],
+        "instead": list(found.instead),
     }
 
 

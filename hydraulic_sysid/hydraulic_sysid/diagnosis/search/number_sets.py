@@ -1,4 +1,4 @@
-"""Several wrong numbers of a data sheet that one effect may stand for, to first order.
+"""Wrong numbers of a data sheet that an effect may stand for, to first order.
 
 An offset of the position is one dead volume larger and the other smaller; beside further numbers that are wrong nobody
 would see it in them. What holding numbers at the model file's values costs follows from the sensitivities alone, with
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -25,36 +26,64 @@ from .criteria import CRITERIA
 from .linearisation import Linearisation
 
 
-def sets_of_one_effect(
-    at: Linearisation, nominal: Mapping[str, float], features: RecordFeatures, freedom: float
-) -> list[tuple[str, ...]]:
-    """Sets of the wrong numbers ``nominal`` [SI, by key] for which one effect of fewer parameters does.
+@dataclass(frozen=True)
+class StandIns:
+    """Effects beside a fit in which numbers of the data sheet are others than the model file says.
 
-    The likeliest first.
-
-    :param at: the fit in which they have the values that the records ask for
-    :param freedom: what a number that is spared is worth of the sum of squares
+    ``off`` (P,): by how much the file's values are, of the parameters' scales; ``places``: where these numbers are
+    among them; ``normal``: of the fit, and ``beside``: the same with what each effect brings; ``share``: of the sum of
+    squares that was looked at.
     """
-    part, share = at.sample(CRITERIA.enough_to_score)
-    own = part.parameters
-    off = np.array([(nominal.get(k, v) - v) for k, v in own.by_key.items()]) / own.scales
-    places = [own.keys.index(k) for k in nominal]
-    sets = [c for size in range(2, len(places) + 1) for c in combinations(places, size)]
-    alone = {held: _cost(part.normal, off, held) for held in sets}
-    best: dict[tuple[str, ...], float] = {}
-    effects = [e for e in candidates(at.model) if not observed(e)] if sets else []
-    for normal in results(lambda effect: _beside(part, effect, features), effects):
-        if normal is None:
-            continue
-        brought = len(normal.information) - len(off)
-        left = {held: _cost(normal, np.concatenate((off, np.zeros(brought))), held) for held in sets}
-        simpler = [h for h in sets if len(h) > brought and left[h] < CRITERIA.rough * alone[h]]
-        likely = {h: left[h] / share - len(h) * freedom for h in simpler}
-        if likely:
-            chosen = min(likely, key=lambda held: likely[held])
-            keys = tuple(own.keys[i] for i in chosen)
-            best[keys] = min(best.get(keys, np.inf), likely[chosen])
-    return sorted(best, key=lambda keys: best[keys])
+
+    keys: tuple[str, ...]
+    places: tuple[int, ...]
+    off: Array
+    normal: NormalEquations
+    beside: Mapping[str, NormalEquations]
+    share: float
+
+    @classmethod
+    def of(cls, at: Linearisation, nominal: Mapping[str, float], features: RecordFeatures) -> StandIns:
+        """Of the fit ``at``, in which the numbers ``nominal`` [SI, by key] have the values that the records ask for."""
+        part, share = at.sample(CRITERIA.enough_to_score)
+        own = part.parameters
+        off = np.array([(nominal.get(k, v) - v) for k, v in own.by_key.items()]) / own.scales
+        effects = [e for e in candidates(at.model) if not observed(e)]
+        found = zip(effects, results(lambda effect: _beside(part, effect, features), effects), strict=True)
+        beside = {e.name: normal for e, normal in found if normal is not None}
+        return cls(tuple(own.keys), tuple(own.keys.index(k) for k in nominal), off, part.normal, beside, share)
+
+    def sets(self, freedom: float) -> list[tuple[str, ...]]:
+        """Sets of the numbers for which one effect of fewer parameters does, the likeliest first.
+
+        :param freedom: what a number that is spared is worth of the sum of squares
+        """
+        sizes = range(2, len(self.places) + 1)
+        sets = [held for size in sizes for held in combinations(self.places, size)]
+        best: dict[tuple[str, ...], float] = {}
+        for name in self.beside:
+            simpler = [h for h in sets if len(h) > self._brought(name) and self._stands_for(name, h)]
+            likely = {h: self._cost(name, h) - len(h) * freedom for h in simpler}
+            if likely:
+                chosen = min(likely, key=lambda held: likely[held])
+                keys = tuple(self.keys[i] for i in chosen)
+                best[keys] = min(best.get(keys, np.inf), likely[chosen])
+        return sorted(best, key=lambda keys: best[keys])
+
+    def any_for(self, key: str, enough: float) -> bool:
+        """Whether beside any effect it costs less than ``enough``, or hardly anything, to hold a number as it was."""
+        held = (self.keys.index(key),)
+        return any(self._cost(name, held) < enough or self._stands_for(name, held) for name in self.beside)
+
+    def _brought(self, name: str) -> int:
+        return len(self.beside[name].information) - len(self.off)
+
+    def _cost(self, name: str, held: tuple[int, ...]) -> float:
+        off = np.concatenate((self.off, np.zeros(self._brought(name))))
+        return _cost(self.beside[name], off, held) / self.share
+
+    def _stands_for(self, name: str, held: tuple[int, ...]) -> bool:
+        return self._cost(name, held) < CRITERIA.rough * _cost(self.normal, self.off, held) / self.share
 
 
 def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> NormalEquations | None:

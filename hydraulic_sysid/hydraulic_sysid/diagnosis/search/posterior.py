@@ -107,6 +107,8 @@ def _known(result: SearchResult, verdict: Verdict) -> dict[What, tuple[float, bo
         rest = tuple(name for name in faults if name != fault.hypothesis.name)
         for gain in fault.alternatives:
             found.setdefault((effects, numbers, (*rest, gain.hypothesis.name)), (1.0, True))
+        for effect in fault.instead:
+            found.setdefault(((*effects, effect), numbers, rest), (1.0, True))
     for d in result.moved:
         rest = tuple(key for key in numbers if key != d.key)
         for number in d.alternatives:

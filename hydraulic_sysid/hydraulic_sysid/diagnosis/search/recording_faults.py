@@ -98,7 +98,7 @@ HYPOTHESES = (
 class RecordingFault:
     """A fault, its ``size`` ± ``standard_error`` [``unit``], and by how much it lowers the sum of squares.
 
-    ``alternatives``: other faults that would explain the same.
+    ``alternatives``: other faults, and ``instead``: effects, that would explain the same.
     """
 
     hypothesis: Hypothesis | DriveHypothesis
@@ -106,6 +106,7 @@ class RecordingFault:
     standard_error: float
     reduction: float
     alternatives: tuple[RecordingFault, ...] = ()
+    instead: tuple[str, ...] = ()
 
     def applied(self, at: Linearisation) -> list[Segments]:
         """The linearisation's segments, their records taken to have it."""
@@ -154,7 +155,8 @@ class RecordingFault:
         corner = f"{1.0 / (2.0 * np.pi * abs(self.size)):.3g} Hz" if self.unit == "s" and self.size else ""
         size = percent(abs(self.size)) if self.unit == "1" else f"{1e3 * abs(self.size):.3g} m{self.unit}"
         own = self.hypothesis.text.format(size=size, late=late, much=much, corner=corner)
-        same = " and ".join(one.text for one in self.alternatives)
+        others = [*(one.text for one in self.alternatives), *(f"{name} is missing" for name in self.instead)]
+        same = ", or ".join(others)
         return f"{own} (or {same}, which these data cannot distinguish)" if same else own
 
 

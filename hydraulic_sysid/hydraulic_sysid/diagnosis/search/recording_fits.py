@@ -243,26 +243,32 @@ class RecordingFits(DataSheetFits):
         return found
 
     def with_other_gains(self, found: SearchResult) -> SearchResult:
-        """With the gains of other readings that say the same as one that was found, beside as many other numbers.
+        """With the gains of other readings, and the effects, that say the same as a gain, beside as many other numbers.
 
         Where the data sheet is in doubt anyway, one transducer that reads too much is the other one that reads too
-        little, with other areas and another supply.
+        little, with other areas and another supply; or both have an offset.
         """
-        if found.added or not found.moved:
+        if not found.moved:
             return found
         faults, before = list(found.faults), self.split
         for i, fault in enumerate(faults):
-            same = []
+            if fault.unit != "1":
+                continue
+            same, instead = list[RecordingFault](), list[str]()
+            undone = replace(fault, size=-fault.size).on(before.segments)
             for other in other_gains(fault, set(before.channels)):
                 self.say(f"fitting with: {other.text}")
-                undone = replace(fault, size=-fault.size).on(before.segments)
                 self.split = replace(before, segments=other.on(undone))
                 with suppress(SimulationError):
                     state = self.state(relaxed(found.final.model), self._last)
                     done, moved = self.fewest_moved(state, None)
                     if len(moved) <= len(found.moved) and not worse(done.misfit, found.final.misfit):
                         same.append(resized(done.linearisation, other))
-            faults[i] = replace(fault, alternatives=tuple(same))
+            self.split = replace(before, segments=undone)
+            with suppress(SimulationError):
+                states = self.in_place_of(None, found.final, (), found.moved)[1]
+                instead = [new_effect(state, found.final) for state in states]
+            faults[i] = replace(fault, alternatives=tuple(same), instead=tuple(instead))
         self.split = before
         return replace(found, faults=tuple(faults))
 
