@@ -28,6 +28,8 @@ OUT = ROOT / "runs" / "criteria"
 WHICH = ("half", "double")
 ONLY_SAID = ("shared", "law_error", "shape_error", "vague_value", "surest")
 """Constants of the errors that are stated: no verdict follows from them."""
+PROBABILITIES = ("odds", "distinct", "law", "most_power", "unknown_laws", "noise_missed")
+"""Constants that become plain numbers only where probabilities are stated; what they decide is compared before."""
 
 
 def half_and_double(name: str) -> dict[str, float]:
@@ -81,6 +83,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=5, metavar="N", help="benches, and one of an unknown law")
     parser.add_argument("--what", choices=tuple(family.WHAT), help="what all of them hide instead of anything")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="constants")
+    parser.add_argument("--effort", type=int, default=3, metavar="N", help="benches on which numbers of tries are varied")
     parser.add_argument("--full", action="store_true")
     parser.add_argument("--watched", action="store_true", help="only in how many benches any decision would be another")
     parser.add_argument("--processes", type=int, default=2, metavar="N")
@@ -109,13 +112,13 @@ def main(argv: list[str] | None = None) -> int:
         for name in names:
             print(name, *(sum(_noted(one, name, which) for one in watched.values()) for which in WHICH))
         return 0
+    some = list(places)[: options.effort]
     again = [
         (bench, (name, which))
+        for bench in places
         for name in names
         for which in WHICH
-        for bench in places
-        if name not in ONLY_SAID
-        and (isinstance(getattr(CRITERIA, name), int) or _noted(watched[bench, None], name, which))
+        if name not in ONLY_SAID and (_noted(watched[bench, None], name, which) or (_counts(name) and bench in some))
     ]
     print(f"{len(again)} of {2 * len(names) * len(places)} are diagnosed again", flush=True)
     done = all_of(again)
@@ -134,7 +137,13 @@ def main(argv: list[str] | None = None) -> int:
 
 def _noted(one: dict[str, Any], name: str, which: str) -> bool:
     """Whether a decision on this bench would be another, or may be."""
-    return (name, which) in {tuple(label) for label in (*one["noted"], *one["lost"])}
+    lost = () if name in PROBABILITIES else one["lost"]
+    return (name, which) in {tuple(label) for label in (*one["noted"], *lost)}
+
+
+def _counts(name: str) -> bool:
+    """Whether a constant is a number of things that are tried, which cannot be watched."""
+    return isinstance(getattr(CRITERIA, name), int)
 
 
 def _key(one: dict[str, Any]) -> tuple[str, Label | None]:

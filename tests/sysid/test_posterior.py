@@ -76,7 +76,7 @@ def test_what_is_left_speaks_for_a_law_that_the_library_lacks() -> None:
     assert levels[1:] == sorted(levels[1:]) and levels[-1] > 0.9
     # Beside an effect that explains a hundred times as much, its own law leaves some of that.
     assert probability_of_unknown(left(400.0), left(1.05)) < probability_of_unknown(left(4.0), left(1.05))
-    at = replace(CRITERIA, odds=1.0, unknown_missed=0.5, unknown_laws=0.0)
+    at = replace(CRITERIA, odds=1.0, noise_missed=0.5, unknown_laws=0.0)
     assert probability_of_unknown(left(2.0), left(1.5), at) == pytest.approx(2.0 / 3.0)
 
 

@@ -41,7 +41,7 @@ class CompetingModel:
 
 def odds(misfit: Misfit, difference: float) -> float:
     """Of a model that leaves ``misfit`` against one that leaves this ``difference`` more of the sum of squares."""
-    needed = CRITERIA.distinct * misfit.variance + CRITERIA.law_of_the_better * misfit.excess
+    needed = CRITERIA.distinct * misfit.variance + CRITERIA.law * misfit.excess
     return float(CRITERIA.odds ** min(max(difference / needed, -CRITERIA.most_power), CRITERIA.most_power))
 
 

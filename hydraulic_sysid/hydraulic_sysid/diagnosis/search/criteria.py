@@ -35,7 +35,10 @@ class Criteria:
         0.02, "share of segments",
         "so many, at least one, turn no verdict, neither by what they leave nor by their gain",
     )  # fmt: skip
-    noise_missed: float = _constant(0.015, "mean square over noise", "what an estimate of the noise from data may miss")
+    noise_missed: float = _constant(
+        0.015, "mean square over noise",
+        "what an estimate of the noise may miss; with it left, an unknown law is twice as probable",
+    )  # fmt: skip
     little: float = _constant(1.03, "σ", "up to this residual nothing need be missing")
     small: float = _constant(1.2, "mean square over noise", "not far off the noise")
     small_unexplained: float = _constant(
@@ -46,7 +49,6 @@ class Criteria:
         0.0025, "share of the residual",
         "by which it must fall where nothing seemed to be left: noise gave 0.09 %, effects 0.35 %",
     )  # fmt: skip
-    explained: float = _constant(0.05, "mean square over noise", "up to this, beyond the noise, little is left to ask")
     more_than_noise: float = _constant(
         2.0, "mean square over noise", "as much as the noise again is left: the shape of a law",
     )  # fmt: skip
@@ -57,7 +59,7 @@ class Criteria:
     # What an effect must explain, beside which others
 
     further: float = _constant(
-        0.25, "share of what is left", "that a further effect must explain, unless it explains a good part of all",
+        0.25, "share of what is left", "that a further effect must explain, unless it explains something of all",
     )  # fmt: skip
     needed: float = _constant(
         0.02, "share of what was explained", "that an effect must explain beside the others to stay",
@@ -65,34 +67,29 @@ class Criteria:
     subordinate: float = _constant(
         0.1, "share of what was explained", "a further effect below it must be told apart to be named",
     )  # fmt: skip
-    law_nearby: float = _constant(
-        0.0025, "share of what was explained",
-        "what a law that is right to a twentieth leaves for others of its subsystem: 0.05²",
+    law: float = _constant(
+        0.05, "share of what it explains",
+        "what laws are right to: others of its subsystem may explain its square, and a better model leave less by it",
     )  # fmt: skip
-    law_elsewhere: float = _constant(0.0005, "share of what was explained", "the same for others of other subsystems")
+    law_elsewhere: float = _constant(
+        0.0005, "share of what was explained", "that effects of other subsystems may explain, as laws are no better",
+    )  # fmt: skip
     promises: float = _constant(
         3.0, "times the least fall", "what takes something off that nothing asked for must gain",
     )  # fmt: skip
-    mostly: float = _constant(
-        0.9, "share of what is beyond the noise", "where more is explained, nobody asks what else might be nearest",
-    )  # fmt: skip
+    nearly: float = _constant(0.9, "share, or collinearity", "from which one thing does nearly what another does")
     hopeless: float = _constant(
         0.6, "share of what is beyond the noise", "where less is explained, exchanging effects will not do either",
     )  # fmt: skip
-    alone: float = _constant(
-        0.5, "share of what the best explains", "below it all others leave the best candidate without a competitor",
+    most_of: float = _constant(
+        0.5, "share", "from which something is the most of a whole: of what an effect takes off, of what is left",
     )  # fmt: skip
-    own: float = _constant(0.5, "share of what an effect takes off", "that must come back where it vanishes")
-    as_good_as_a_curve: float = _constant(
-        0.8, "share of what the best curve explains",
-        "that a further effect must explain where more than noise is left",
-    )  # fmt: skip
-    far: float = _constant(5.0, "times what the best leaves", "what leaves more comes not near it")
-    distant: float = _constant(
-        0.02, "share of what an effect explains", "by which a quick refit in its place may lie above, to be finished",
+    far: float = _constant(
+        5.0, "times what the best leaves", "what leaves more than so many times as much comes not near it",
     )  # fmt: skip
     stops_short: float = _constant(
-        2.0, "times", "the same, by how much the quick refit of the effect itself stops short of its fit",
+        2.0, "times",
+        "how far a quick refit in an effect's place may lie above, of how far the effect's own stops short of its fit",
     )  # fmt: skip
 
     # Which candidates are fitted, and to what
@@ -101,9 +98,6 @@ class Criteria:
     near: float = _constant(0.93, "share of the best fall", "from which a refit is finished")
     promised: float = _constant(
         0.5, "share of what must be explained", "that a quick refit must show to be fitted to the end",
-    )  # fmt: skip
-    same_change: float = _constant(
-        0.9, "collinearity", "of a rival with an effect, from which it cannot leave far more",
     )  # fmt: skip
     other_change: float = _constant(
         0.5, "collinearity", "below which an effect and a rival cannot leave as little as each other by what they do",
@@ -131,29 +125,25 @@ class Criteria:
 
     odds: float = _constant(20.0, "odds", "from which two models are told apart: 95 %")
     distinct: float = _constant(30.0, "σ²", "the difference of the sums of squares that gives these odds")
-    law_of_the_better: float = _constant(
-        0.05, "share of what the better one leaves", "the same: no law is quite that of the bench",
-    )  # fmt: skip
     most_power: float = _constant(
         3.0, "power of the odds", "up to which odds are counted: a fit may have stopped short",
     )  # fmt: skip
-    unknown_missed: float = _constant(
-        0.01, "mean square over noise",
-        "what an estimate of the noise may miss: with it left, an unknown law is twice as probable",
-    )  # fmt: skip
     unknown_laws: float = _constant(
-        1e-3, "share of the mean square explained", "the same: no law is quite that of the bench",
+        1e-3, "share of the mean square explained",
+        "that laws leave without a law that the library lacks being more probable",
     )  # fmt: skip
 
     # Numbers of the data sheet
 
+    rough: float = _constant(
+        0.02, "share of what is explained", "what a prediction or a quick refit that goes far may be off",
+    )  # fmt: skip
     number_visible: float = _constant(
         0.01, "share of all values, in σ²", "fall for which a number of the data sheet is named",
     )  # fmt: skip
     plausible: float = _constant(
         3.0, "times the default", "standard deviation of the size of an effect that is a share",
     )  # fmt: skip
-    rough: float = _constant(0.02, "share of what numbers explain", "what a prediction that far may be off")
     clear: float = _constant(
         10.0, "times what names a number", "beyond which a fit need not show what keeping it costs",
     )  # fmt: skip
@@ -167,22 +157,20 @@ class Criteria:
         0.95, "sampling intervals, or per cent", "by less a sound transducer with its filter is late, too",
     )  # fmt: skip
     conversion_order: float = _constant(0.6, "sampling intervals", "by less another order of conversion makes early")
-    same_delay: float = _constant(0.05, "sampling intervals", "by which two delays are one")
+    same_delay: float = _constant(0.03, "sampling intervals", "by which two delays are one")
     unnoticed: float = _constant(0.003, "share of the motion", "what leaves less is no disturbance of the drive")
     same_size: float = _constant(
         0.005, "share of a fault's size",
         "until it changes by no more it is sought again: what is left of a gain is an offset",
-    )  # fmt: skip
-    rival: float = _constant(
-        0.8, "share of what the best candidate explains", "from which a fault of the recording may be in its place",
     )  # fmt: skip
     glimpsed: float = _constant(
         0.25, "share of what must be explained",
         "that a fault of a reading must promise before the model is fitted with it",
     )  # fmt: skip
     quieter: float = _constant(0.95, "of the noise before", "what was judged by more is judged again")
-    retimed: float = _constant(0.03, "sampling intervals", "by which a channel is less late than before: the same")
-    agreeing_records: int = _constant(3, "records", "that agree on a small change along a record")
+    several_records: int = _constant(
+        3, "records", "that say something by their scatter, or agree on a small change along a record",
+    )  # fmt: skip
     records_agree: float = _constant(
         20.0, "variance ratio", "squared size of that change over its scatter between records",
     )  # fmt: skip
@@ -200,28 +188,12 @@ class Criteria:
         "less is nothing to anybody, however little noise the sensors have",
     )  # fmt: skip
     vague_drive: float = _constant(1.5, "mean square over noise", "what a drive that is known in part may leave")
-    blamed: float = _constant(
-        0.5, "share of what was to be explained", "where more is left it is not the drive that is wrong",
-    )  # fmt: skip
-    unexplained: float = _constant(
-        0.2, "share of what was to be explained", "more left is no matter of a law's details",
-    )  # fmt: skip
-    unexplained_beside: float = _constant(
-        0.1, "share of what was to be explained",
-        "the same beside an effect: a law left 5 % at most, a proxy 10 to 15 %",
-    )  # fmt: skip
-    unattributed: float = _constant(
-        0.125, "share of what is left", "a curve that explains less of it shows no law that is missing",
-    )  # fmt: skip
-    law_shown: float = _constant(
-        0.5, "share of what is left",
-        "a curve that explains more of it is a law that is missing, where far more than noise is left",
+    details: float = _constant(
+        0.125, "share",
+        "of what was to be explained or is left: less is a matter of a law's details; a law left 5 % at most",
     )  # fmt: skip
     right_law: float = _constant(
         9.0, "mean square over noise", "more is left by no right law: those rightly named left 7.2 at most",
-    )  # fmt: skip
-    alike: float = _constant(
-        0.9, "share of what the best curve explains", "from which another curve tells as well where it is",
     )  # fmt: skip
     remainder_seen: float = _constant(
         0.1, "of the noise", "below which what remains beyond it is that of the noise's own estimate",

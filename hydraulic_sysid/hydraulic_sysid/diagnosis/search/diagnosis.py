@@ -136,7 +136,7 @@ def diagnose(
             competing["+".join(tied)] = done
         before, after = found.base.model, found.final.model if found.added or found.moved else None
         # A change along the records and a curve that shows a law say by themselves where it is.
-        shown = verdicts.drifting_effect(found) is not None or any(c.share > CRITERIA.unattributed for c in curves)
+        shown = verdicts.drifting_effect(found) is not None or any(c.share > CRITERIA.details for c in curves)
         asked = outside and not shown
         suspected = None if not asked else before if proxy else after
         del found, suspect  # their sensitivities would take up the memory that the balances need

@@ -85,7 +85,7 @@ def steady(own: Array, size: Array, fitted: Mask, records: Index) -> bool:
     off = np.abs(own - size * own.sum() / max(float(size.sum()), np.finfo(float).tiny))
     kept = but_the_worst(off, np.ones(off.size))
     in_records = [np.bincount(records[kept], weights=x[kept]).astype(float) for x in (own, size)]
-    few = np.count_nonzero(in_records[1]) < CRITERIA.agreeing_records
+    few = np.count_nonzero(in_records[1]) < CRITERIA.several_records
     if few or agreement(in_records[0], in_records[1]) < CRITERIA.records_agree:
         return False
     return sure(own[kept], size[kept], fitted[kept])

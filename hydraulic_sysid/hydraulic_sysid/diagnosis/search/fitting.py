@@ -197,7 +197,7 @@ class Fitting:
         lead: over few periods a wrong frequency is hardly a wrong phase.
         """
         found = self.state(model, self._first if far else self._last)
-        if found.misfit.variance - 1.0 < CRITERIA.explained:
+        if found.misfit.variance < CRITERIA.little**2:
             return found
         best = found
         with suppress(SimulationError):  # they lead where the plant does not run
@@ -316,7 +316,7 @@ def retimed(before: Split, after: Split) -> bool:
     changed = dict.fromkeys(after.channels, 0.0)
     for new, old in zip(after.segments, before.segments, strict=True):
         for c, (n, o) in enumerate(zip(new.readings, old.readings, strict=True)):
-            if abs(n.delay - o.delay) > CRITERIA.retimed * new.record.dt:
+            if abs(n.delay - o.delay) > CRITERIA.same_delay * new.record.dt:
                 changed[new.channels[c]] += (n.delay - o.delay) ** 2 * float(new.timing[c])
     return any(c > CRITERIA.significant for c in changed.values())
 

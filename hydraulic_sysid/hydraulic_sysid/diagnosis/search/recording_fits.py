@@ -55,7 +55,7 @@ class RecordingFits(DataSheetFits):
             if nothing and not any(self.bends(f, base) for f in faults):
                 break
             best = base.refits[0].misfit.fit if base.refits else base.misfit.fit
-            enough = CRITERIA.rival * (base.misfit.fit - best)
+            enough = CRITERIA.nearly * (base.misfit.fit - best)
             named = [f for f in faults if not base.misfit.little or f.unusual(self.split.interval)]
             self.rivals = [f for f in named if not f.linear and f.reduction >= enough][: CRITERIA.most_finished]
             least = base.misfit.fit - best - base.misfit.least

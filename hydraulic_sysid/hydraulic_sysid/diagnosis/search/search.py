@@ -98,7 +98,7 @@ class Search(RecordingFits):
         competing = dict(found.competing)
         for name, without in found.competing.items():
             rivals = competing_models(name, without, found.final.misfit)
-            stuck = {c.name for c in rivals if c.distinguishable and c.collinearity > CRITERIA.same_change}
+            stuck = {c.name for c in rivals if c.distinguishable and c.collinearity > CRITERIA.nearly}
             if not stuck:
                 continue
             with suppress(SimulationError):  # it does not run without the effect
@@ -158,7 +158,7 @@ class Search(RecordingFits):
         if not shares or shares[0].share < CRITERIA.further:
             return found
         best, *others = shares
-        if any(s.share > CRITERIA.rival * best.share for s in others):
+        if any(s.share > CRITERIA.nearly * best.share for s in others):
             return found
         base, state = self.as_it_is(best.without), self.as_it_is(best.model)
         self.say.reached([best.name], state.misfit)
@@ -287,7 +287,7 @@ class Search(RecordingFits):
                 better = None
             needed = 0.0
             if better is not None and added:
-                needed = CRITERIA.as_good_as_a_curve * self.share_of_a_curve(path[-1], better)
+                needed = CRITERIA.nearly * self.share_of_a_curve(path[-1], better)
                 better = better if explained(path[-1].misfit, better.misfit) >= needed else None
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
             doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= CRITERIA.nothing_left)
@@ -305,7 +305,7 @@ class Search(RecordingFits):
             added.append(new_effect(better, path[-1]))
             self.path = [*path, better]
             self.say.reached(added, better.misfit)
-            last = len(added) == CRITERIA.most_effects and explained(base.misfit, better.misfit) > CRITERIA.mostly
+            last = len(added) == CRITERIA.most_effects and explained(base.misfit, better.misfit) > CRITERIA.nearly
             # What was judged by a model that lacked it would ask for further effects.
             again = None if last or better.misfit.variance >= CRITERIA.far_off else self.judged_anew(better)
             if again is not None:
@@ -337,7 +337,7 @@ class Search(RecordingFits):
         of one that the library lacks, and one effect after the other would only imitate it. What is missing explains
         more, fitted, than a curve does to first order. A curve over the time is the shape of none.
         """
-        most = explained(before.misfit, after.misfit) >= CRITERIA.as_good_as_a_curve
+        most = explained(before.misfit, after.misfit) >= CRITERIA.nearly
         if most or before.misfit.variance < CRITERIA.more_than_noise:
             return 0.0
         return max((c.share for c in self.curves(before, self.say) if c.variable != "time"), default=0.0)

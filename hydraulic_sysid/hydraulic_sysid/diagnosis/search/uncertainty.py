@@ -33,7 +33,6 @@ from .criteria import CRITERIA
 from .linearisation import Linearisation
 
 _COVERED = 0.95
-_FEWEST = 3  # records whose scatter says something
 _STEP = 0.25  # of a tolerance: how far a held number is moved to see what it changes
 EXACT: Mapping[str, float] = MappingProxyType({})
 """Tolerances of a data sheet that is taken for the truth."""
@@ -144,7 +143,7 @@ def _of_held(at: Linearisation, free: Index, bread: Array, tolerances: Mapping[s
 def _errors(bread: Array, scores: Sequence[Array]) -> tuple[Array, Array]:
     """Standard errors (P,) and half widths (P,) of the 95 % intervals, by segments and by records."""
     clusters = [np.concatenate(scores)]
-    if len(scores) >= _FEWEST:
+    if len(scores) >= CRITERIA.several_records:
         clusters.append(np.array([s.sum(axis=0) for s in scores]))
     variances = [np.diag(sandwich(bread, c)) for c in clusters]
     variances[0] = np.maximum(variances[0], np.diag(bread))

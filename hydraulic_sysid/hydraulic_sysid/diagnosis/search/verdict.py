@@ -147,18 +147,18 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     little = final.little or immaterial(final, result.remainders) or result.by_force is not None
     if not result.added:
         # Faults of the recording may have explained the most of it.
-        if not little and unexplained_share(result.before_laws, final) > CRITERIA.unexplained:
+        if not little and unexplained_share(result.before_laws, final) > CRITERIA.details:
             return RECORDING if drive_blamed(result) else OUTSIDE
         return RECORDING if faulty(result) else DATA_SHEET if result.moved else COMPLETE
     if strained(result) and not tied:
         return OUTSIDE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
-    no_law = bool(curves) and all(c.share < CRITERIA.unattributed for c in curves)
+    no_law = bool(curves) and all(c.share < CRITERIA.details for c in curves)
     details = final.variance < CRITERIA.small or no_law
-    if final.usual > CRITERIA.right_law and any(c.share > CRITERIA.law_shown for c in curves):
+    if final.usual > CRITERIA.right_law and any(c.share > CRITERIA.most_of for c in curves):
         return OUTSIDE
-    allowed = CRITERIA.small_unexplained if details else CRITERIA.unexplained_beside
+    allowed = CRITERIA.small_unexplained if details else CRITERIA.details
     if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * CRITERIA.noise_missed:
         return OUTSIDE
     if probability_of_unknown(result.before_laws, final) > 0.5 and not no_law:
@@ -201,7 +201,7 @@ def drive_blamed(result: SearchResult) -> bool:
     Disturbances of a drive are free enough to take up a part of anything.
     """
     left = result.base.misfit
-    most = unexplained_share(result.before_over_noise, left) < CRITERIA.blamed
+    most = unexplained_share(result.before_over_noise, left) < CRITERIA.most_of
     return drive_unknown(result) and most and left.usual < CRITERIA.far_off
 
 
@@ -239,14 +239,14 @@ def nowhere(curves: Sequence[NonparametricCurve]) -> bool:
     What acts in a plant reaches the position through its mass and its oil, so that some slow curve takes up a part of
     it; what spoils the reading of the position itself need not be a function of anything.
     """
-    return bool(curves) and all(c.share <= CRITERIA.unattributed for c in curves)
+    return bool(curves) and all(c.share <= CRITERIA.details for c in curves)
 
 
 def as_likely(curves: Sequence[NonparametricCurve], best: NonparametricCurve) -> list[NonparametricCurve]:
     """The best curve of each other subsystem that explains nearly as much as the ``best`` one."""
     found: dict[str, NonparametricCurve] = {}
     for c in curves:
-        if c.subsystem != best.subsystem and c.share > CRITERIA.alike * best.share:
+        if c.subsystem != best.subsystem and c.share > CRITERIA.nearly * best.share:
             found.setdefault(c.subsystem, c)
     return list(found.values())
 
@@ -257,10 +257,11 @@ def elsewhere(result: SearchResult, curves: Sequence[NonparametricCurve]) -> Non
     What drifts elsewhere may be followed by a parameter of the model: the zero of a sensor by that of a valve.
     """
     drifting = drifting_effect(result)
-    if drifting is None or not curves or curves[0].share < CRITERIA.law_shown:
+    if drifting is None or not curves or curves[0].share < CRITERIA.most_of:
         return None
     own = subsystem(result.model.library[drifting])
-    return None if any(c.subsystem == own and c.share > CRITERIA.alike * curves[0].share for c in curves) else curves[0]
+    best, least = curves[0], CRITERIA.nearly * curves[0].share
+    return None if any(c.subsystem == own and c.share > least for c in curves) else best
 
 
 def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
@@ -292,7 +293,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         return " ".join(["Data sheet:", *data_sheet_sentences(result), *aside, fell, left, NO_EFFECT])
     aside = [*drift_sentences(result), *aside]
     beside = [*force_sentences(result), *data_sheet_sentences(result), *recording_sentences(result), *aside]
-    if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > CRITERIA.unexplained:
+    if verdict.kind != OUTSIDE and unexplained_share(result.base.misfit, result.final.misfit) > CRITERIA.details:
         beside.append(remainder_sentence(result.remainders))
     if verdict.kind == MISSING:
         fall = [] if result.by_force is not None else [fell]
@@ -315,7 +316,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     best = curves[0] if curves and drift is None else elsewhere(result, curves)
     if best is not None and nowhere([best]):
         text += (
-            f"No curve at any place of the plant would explain {100 * CRITERIA.unattributed:.0f} % of it: "
+            f"No curve at any place of the plant would explain {100 * CRITERIA.details:.0f} % of it: "
             "it may be in how the motion is read."
         )
     elif best is not None:

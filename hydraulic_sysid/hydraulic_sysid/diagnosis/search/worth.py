@@ -51,7 +51,7 @@ def absorbs_discrepancy(
     alike = any(subsystem(library[name]) == subsystem(library[other]) for other in others)
     if not alike and explained(before.misfit, after) >= part * CRITERIA.hopeless:
         return False
-    least = part * (CRITERIA.law_nearby if alike else CRITERIA.law_elsewhere)
+    least = part * (CRITERIA.law**2 if alike else CRITERIA.law_elsewhere)
     return before.misfit.total - after.total < least * (base.misfit.total - after.total)
 
 
@@ -68,7 +68,7 @@ def near_competitors(base: SearchState, without: SearchState, state: SearchState
     """The state ``without`` an effect, and of its refits those that come near the state with it."""
     if explained(base.misfit, state.misfit) < CRITERIA.hopeless:
         return replace(without, refits=[])
-    far = CRITERIA.distant * (without.misfit.total - state.misfit.total)
+    far = CRITERIA.rough * (without.misfit.total - state.misfit.total)
     short = [CRITERIA.stops_short * (r.misfit.excess - state.misfit.excess) for r in without.refits if r.name == name]
     left = state.misfit.excess + max([far, *short])
     return replace(without, refits=[r for r in without.others(name) if r.misfit.excess < left])
@@ -80,11 +80,11 @@ def without_competitor(base: SearchState, final: SearchState, name: str) -> bool
     That is judged by what they explain or, where in the end all is explained, by what they leave.
     """
     own = next((r.misfit for r in base.refits if r.name == name), None)
-    if own is None or base.misfit.total - own.total < CRITERIA.mostly * base.misfit.excess:
+    if own is None or base.misfit.total - own.total < CRITERIA.nearly * base.misfit.excess:
         return False
     others = [r.misfit for r in base.others(name)]
-    alone = all(base.misfit.total - at.total < CRITERIA.alone * (base.misfit.total - own.total) for at in others)
-    little = final.misfit.variance - 1.0 < CRITERIA.explained
+    alone = all(base.misfit.total - at.total < CRITERIA.most_of * (base.misfit.total - own.total) for at in others)
+    little = final.misfit.variance < CRITERIA.little**2
     return alone or (little and all(at.excess > CRITERIA.far * (own.excess + at.least) for at in others))
 
 
@@ -111,7 +111,7 @@ def borrowed(before: SearchState, after: SearchState, name: str) -> bool:
     except SimulationError:  # it does not run without it
         return False
     back = sum(float(np.sum(new.costs - old)) for new, old in zip(without, point.costs, strict=True))
-    return back < CRITERIA.own * (before.misfit.total - after.misfit.total)
+    return back < CRITERIA.most_of * (before.misfit.total - after.misfit.total)
 
 
 def leaves_most(before: Misfit, after: Misfit, nothing: bool = False) -> bool:
