@@ -83,7 +83,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=5, metavar="N", help="benches, and one of an unknown law")
     parser.add_argument("--what", choices=tuple(family.WHAT), help="what all of them hide instead of anything")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="constants")
-    parser.add_argument("--effort", type=int, default=3, metavar="N", help="benches on which numbers of tries are varied")
+    parser.add_argument("--effort", type=int, default=3, metavar="N", help="benches for numbers of tries")
     parser.add_argument("--full", action="store_true")
     parser.add_argument("--watched", action="store_true", help="only in how many benches any decision would be another")
     parser.add_argument("--processes", type=int, default=2, metavar="N")
