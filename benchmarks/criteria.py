@@ -28,6 +28,8 @@ OUT = ROOT / "runs" / "criteria"
 WHICH = ("half", "double")
 ONLY_SAID = ("shared", "law_error", "shape_error", "vague_value", "surest")
 """Constants of the errors that are stated: no verdict follows from them."""
+EFFORT = tuple(f.name for f in fields(Criteria) if f.metadata.get("effort"))
+"""Constants that say how much is done: they are varied on the first benches (``--effort``)."""
 PROBABILITIES = ("odds", "distinct", "law", "most_power", "unknown_laws", "noise_missed")
 """Constants that become plain numbers only where probabilities are stated; what they decide is compared before."""
 
@@ -58,7 +60,7 @@ def run(task: tuple[str, Path, bool, Label | None]) -> dict[str, Any]:
     else:
         for field in fields(Criteria):
             value = getattr(CRITERIA, field.name)
-            if isinstance(value, float) and field.name not in ONLY_SAID:
+            if isinstance(value, float) and field.name not in ONLY_SAID:  # else nothing can be watched, or need be
                 others = {(field.name, which): one for which, one in half_and_double(field.name).items()}
                 object.__setattr__(CRITERIA, field.name, WatchedNumber(value, others, noted, lost))
 
@@ -118,7 +120,8 @@ def main(argv: list[str] | None = None) -> int:
         for bench in places
         for name in names
         for which in WHICH
-        if name not in ONLY_SAID and (_noted(watched[bench, None], name, which) or (_counts(name) and bench in some))
+        if (name in EFFORT and bench in some and not _floating(name))
+        or (_noted(watched[bench, None], name, which) and (bench in some or name not in EFFORT))
     ]
     print(f"{len(again)} of {2 * len(names) * len(places)} are diagnosed again", flush=True)
     done = all_of(again)
@@ -141,9 +144,9 @@ def _noted(one: dict[str, Any], name: str, which: str) -> bool:
     return (name, which) in {tuple(label) for label in (*one["noted"], *lost)}
 
 
-def _counts(name: str) -> bool:
-    """Whether a constant is a number of things that are tried, which cannot be watched."""
-    return isinstance(getattr(CRITERIA, name), int)
+def _floating(name: str) -> bool:
+    """Whether a constant is watched: a number of things that are tried is not."""
+    return isinstance(getattr(CRITERIA, name), float)
 
 
 def _key(one: dict[str, Any]) -> tuple[str, Label | None]:

@@ -14,6 +14,12 @@ def _constant(value: float, unit: str, reason: str, half: str = "", double: str 
     return field(default=value, metadata={"unit": unit, "reason": reason, "half": half, "double": double})
 
 
+def _effort(value: float, unit: str, reason: str, half: str = "", double: str = "") -> Any:
+    """A constant that says how much is done before something is decided."""
+    own = _constant(value, unit, reason, half, double)
+    return field(default=value, metadata={**own.metadata, "effort": True})
+
+
 @dataclass(frozen=True)
 class Criteria:
     """Constants by name; ``metadata`` of a field: its ``unit`` and ``reason``, what ``half`` and ``double`` change."""
@@ -147,8 +153,8 @@ class Criteria:
     clear: float = _constant(
         10.0, "times what names a number", "beyond which a fit need not show what keeping it costs",
     )  # fmt: skip
-    guessed: int = _constant(
-        4, "numbers", "where more are others the sheet is a guess, and none can be told from the rest",
+    guessed: float = _constant(
+        4.0, "numbers", "where more are others the sheet is a guess, and none can be told from the rest",
     )  # fmt: skip
 
     # The recording, its noise and its changes
@@ -168,8 +174,8 @@ class Criteria:
         "that a fault of a reading must promise before the model is fitted with it",
     )  # fmt: skip
     quieter: float = _constant(0.95, "of the noise before", "what was judged by more is judged again")
-    several_records: int = _constant(
-        3, "records", "that say something by their scatter, or agree on a small change along a record",
+    several_records: float = _constant(
+        3.0, "records", "that say something by their scatter, or agree on a small change along a record",
     )  # fmt: skip
     records_agree: float = _constant(
         20.0, "variance ratio", "squared size of that change over its scatter between records",
@@ -218,44 +224,38 @@ class Criteria:
 
     # How much is done
 
-    most_effects: int = _constant(6, "effects", "together with data sheet and recording")
-    most_swaps: int = _constant(3, "effects", "that take the place of others")
-    most_stuck: int = _constant(2, "rivals", "that change the same and are fitted anew")
-    most_faults: int = _constant(3, "faults", "of the recording")
-    most_sizes: int = _constant(4, "fits", "that the size of a fault is sought in")
-    most_refits: int = _constant(8, "candidates", "that are refitted at first")
-    later_refits: int = _constant(4, "candidates", "once something was added")
-    most_alike: int = _constant(
+    most_effects: int = _effort(6, "effects", "together with data sheet and recording")
+    most_swaps: int = _effort(3, "effects", "that take the place of others")
+    most_stuck: int = _effort(2, "rivals", "that change the same and are fitted anew")
+    most_faults: int = _effort(3, "faults", "of the recording")
+    most_sizes: int = _effort(4, "fits", "that the size of a fault is sought in")
+    most_refits: int = _effort(8, "candidates", "that are refitted at first")
+    later_refits: int = _effort(4, "candidates", "once something was added")
+    most_alike: int = _effort(
         2, "candidates", "of one subsystem then: what its laws left makes all of its effects look promising",
     )  # fmt: skip
-    most_finished: int = _constant(2, "candidates", "that are refitted from more than one start, and fitted to the end")
-    most_others: int = _constant(
-        3, "candidates", "that are set against the nearest where a quick refit is no sure guide",
-    )  # fmt: skip
-    most_suspects: int = _constant(2, "numbers", "of the data sheet that are tried in the place of one")
-    most_sets: int = _constant(2, "sets of numbers", "in whose place one effect is tried")
-    enough_to_fit: int = _constant(60, "segments", "that do for a first fit")
-    look: int = _constant(20, "segments", "that show where a fit from other values leads")
-    fine_look: float = _constant(0.2, "share of what must be gained", "steps that gain less end such a fit")
-    few_steps: int = _constant(6, "steps", "of a fit that only sets effects against each other")
-    few_gain: float = _constant(2e-3, "share of the sum of squares", "that its steps gain")
-    first_gain: float = _constant(
-        0.02, "share of the sum of squares", "that steps gain while the noise is not known yet",
-    )  # fmt: skip
-    last_steps: int = _constant(8, "steps", "of a fit that begins where a quick refit ended")
-    last_gain: float = _constant(5e-5, "share of the sum of squares", "that its steps gain")
-    shorter: int = _constant(4, "times", "shorter segments from which a fit that is far off begins once more")
-    beyond_bound: int = _constant(
+    most_finished: int = _effort(2, "candidates", "that are refitted from more than one start, and fitted to the end")
+    most_others: int = _effort(3, "candidates", "that are set against the nearest where a quick refit is no sure guide")
+    most_suspects: int = _effort(2, "numbers", "of the data sheet that are tried in the place of one")
+    most_sets: int = _effort(2, "sets of numbers", "in whose place one effect is tried")
+    enough_to_fit: int = _effort(60, "segments", "that do for a first fit")
+    look: int = _effort(20, "segments", "that show where a fit from other values leads")
+    fine_look: float = _effort(0.2, "share of what must be gained", "steps that gain less end such a fit")
+    few_steps: int = _effort(6, "steps", "of a fit that only sets effects against each other")
+    few_gain: float = _effort(2e-3, "share of the sum of squares", "that its steps gain")
+    first_gain: float = _effort(0.02, "share of the sum of squares", "that steps gain while the noise is not known yet")
+    last_steps: int = _effort(8, "steps", "of a fit that begins where a quick refit ended")
+    last_gain: float = _effort(5e-5, "share of the sum of squares", "that its steps gain")
+    shorter: int = _effort(4, "times", "shorter segments from which a fit that is far off begins once more")
+    beyond_bound: int = _effort(
         8, "values", "of a number at its bound, over all where it may go, from which a fit may begin",
     )  # fmt: skip
-    most_judged: int = _constant(6, "rounds", "of estimating noise and delays and fitting again")
-    enough_to_score: int = _constant(50, "segments", "that do for a look at candidates")
-    many_probes: int = _constant(8, "groups of probes", "beyond which they are narrowed down on one record")
-    nearest_probes: int = _constant(4, "groups of probes", "that remain")
-    too_far: float = _constant(1.0, "times what is left", "a probe that changes more is no first order")
-    starts_as_well: float = _constant(
-        0.5, "share of the best prediction", "from which another shape is a start as well",
-    )  # fmt: skip
+    most_judged: int = _effort(6, "rounds", "of estimating noise and delays and fitting again")
+    enough_to_score: int = _effort(50, "segments", "that do for a look at candidates")
+    many_probes: int = _effort(8, "groups of probes", "beyond which they are narrowed down on one record")
+    nearest_probes: int = _effort(4, "groups of probes", "that remain")
+    too_far: float = _effort(1.0, "times what is left", "a probe that changes more is no first order")
+    starts_as_well: float = _effort(0.5, "share of the best prediction", "from which another shape is a start as well")
 
 
 CRITERIA = Criteria()
