@@ -4,8 +4,8 @@
 
 Benches are of the family that hides anything, and one of an unknown law (--what: all of one kind). Each is diagnosed
 once with all constants watched: where no comparison comes out differently, half or double would change nothing at all.
-For the others it is diagnosed again. Printed are, per constant, the benches whose verdict is another then (kind,
-effects, numbers or faults), and whether it is right. Of a share above a half what it lacks to 1 is halved or doubled,
+For the others the quickest benches are diagnosed again. Printed are, per constant, in how many benches a decision would
+be another, and those whose verdict is (kind, effects, numbers or faults), and whether that is right. Of a share above a half what it lacks to 1 is halved or doubled,
 of a residual over noise what it has beyond 1. Diagnoses are quick ones (--full: not). A run continues where it ended.
 """
 
@@ -15,6 +15,7 @@ import argparse
 import json
 import multiprocessing
 import sys
+import time
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,7 @@ def run(task: tuple[str, Path, bool, Label | None]) -> dict[str, Any]:
     from hydraulic_sysid.diagnosis.search import diagnose
 
     name, place, quick, changed = task
+    begin = time.perf_counter()
     noted, lost = set[Label](), set[Label]()
     if changed is not None:
         object.__setattr__(CRITERIA, changed[0], half_and_double(changed[0])[changed[1]])
@@ -68,7 +70,11 @@ def run(task: tuple[str, Path, bool, Label | None]) -> dict[str, Any]:
     result = plain(diagnose(model, records, quick=quick).result)
     marks = scoring.judge(json.loads((place / "answer.json").read_text()), result)
     right = bool(marks["verdict_right"])
-    return {"bench": name, "said": said(result), "right": right, "noted": sorted(noted), "lost": sorted(lost - noted)}
+    took = time.perf_counter() - begin
+    return {
+        "bench": name, "said": said(result), "right": right, "seconds": took,
+        "noted": sorted(noted), "lost": sorted(lost - noted),
+    }  # fmt: skip
 
 
 def said(result: dict[str, Any]) -> str:
@@ -85,7 +91,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=5, metavar="N", help="benches, and one of an unknown law")
     parser.add_argument("--what", choices=tuple(family.WHAT), help="what all of them hide instead of anything")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="constants")
-    parser.add_argument("--effort", type=int, default=3, metavar="N", help="benches for numbers of tries")
+    parser.add_argument("--again", type=int, default=6, metavar="N", help="benches, the quickest, diagnosed again")
+    parser.add_argument("--effort", type=int, default=3, metavar="N", help="of these for numbers of tries")
     parser.add_argument("--full", action="store_true")
     parser.add_argument("--watched", action="store_true", help="only in how many benches any decision would be another")
     parser.add_argument("--processes", type=int, default=2, metavar="N")
@@ -114,10 +121,11 @@ def main(argv: list[str] | None = None) -> int:
         for name in names:
             print(name, *(sum(_noted(one, name, which) for one in watched.values()) for which in WHICH))
         return 0
-    some = list(places)[: options.effort]
+    quickest = sorted(places, key=lambda bench: watched[bench, None]["seconds"])[: options.again]
+    some = quickest[: options.effort]
     again = [
         (bench, (name, which))
-        for bench in places
+        for bench in quickest
         for name in names
         for which in WHICH
         if (name in EFFORT and bench in some and not _floating(name))
@@ -126,15 +134,16 @@ def main(argv: list[str] | None = None) -> int:
     print(f"{len(again)} of {2 * len(names) * len(places)} are diagnosed again", flush=True)
     done = all_of(again)
     right = sum(one["right"] for one in watched.values())
-    print(f"\nas they are: {right} of {len(places)} right")
+    print(f"\nas they are: {right} of {len(places)} right; diagnosed again: {', '.join(quickest)}")
     for name in names:
         for which, value in half_and_double(name).items():
+            other = sum(_noted(one, name, which) for one in watched.values())
             others = [
                 f"{bench}: {one['said']} ({'right' if one['right'] else 'wrong'})"
                 for (bench, changed), one in done.items()
                 if changed == (name, which) and one["said"] != watched[bench, None]["said"]
             ]
-            print(f"{name} {value:g}: {'; '.join(others) or 'nothing'}")
+            print(f"{name} {value:g}: decisions in {other}; verdicts: {'; '.join(others) or 'none'}")
     return 0
 
 
