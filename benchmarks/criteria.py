@@ -5,8 +5,9 @@
 Benches are of the family that hides anything, and one of an unknown law (--what: all of one kind). Each is diagnosed
 once with all constants watched: where no comparison comes out differently, half or double would change nothing at all.
 For the others the quickest benches are diagnosed again. Printed are, per constant, in how many benches a decision would
-be another, and those whose verdict is (kind, effects, numbers or faults), and whether that is right. Of a share above a half what it lacks to 1 is halved or doubled,
-of a residual over noise what it has beyond 1. Diagnoses are quick ones (--full: not). A run continues where it ended.
+be another, and those whose verdict is (kind, effects, numbers or faults), and whether that is right. Of a share above a
+half what it lacks to 1 is halved or doubled, of a residual over noise what it has beyond 1. Diagnoses are quick ones
+(--full: not). A run continues where it ended.
 """
 
 from __future__ import annotations

@@ -242,6 +242,27 @@ def test_a_rival_that_was_stuck_begins_once_more_where_the_search_ended(model: M
     assert again[2] is refits[1]  # it changes something else
 
 
+def test_rivals_are_fitted_to_the_end_before_they_are_told_apart(model: Model) -> None:
+    """A friction that is larger one way, whose quick refit stopped short, and a delay that is out of the question."""
+    loaded = model.with_effect("constant_load", {"load": 900.0})
+    search = Search.of(model, records(driven(loaded)), [], FitSettings(), lambda _: None)
+    base, final = search.begin(), search.state(loaded)
+
+    def refit(name: str, key: str, value: float, share: float) -> CandidateRefit:
+        """Of an effect that explains, quickly refitted, a share of what the load does."""
+        left = replace(base.misfit, fit=base.misfit.fit - share * (base.misfit.fit - final.misfit.fit))
+        return CandidateRefit(name, Refit(base.model.with_effect(name, {key: value}), base.linearisation.costs), left)
+
+    near, far = refit("friction_asymmetry", "difference", -100.0, 0.8), refit("sensor_delay", "delay", 1e-3, 0.3)
+    without, misfits = replace(base, refits=[near, far]), {"constant_load": final.misfit}
+    found = SearchResult(model, search.split, search.settings, without, final, misfits, {"constant_load": without})
+    (again, same) = search.rivals_finished(found).competing["constant_load"].refits
+    assert again.name == near.name and again.finished and again.misfit.excess < 0.05 * base.misfit.excess
+    assert same is far and not far.finished
+    rivals = verdict.judge(search.rivals_finished(found)).competing["constant_load"]
+    assert [(c.name, c.finished) for c in rivals] == [("friction_asymmetry", True), ("sensor_delay", False)]
+
+
 def test_rivals_that_a_loose_data_sheet_made_as_good_are_looked_for_as_it_was_filed(model: Model) -> None:
     """Beside numbers that do what a load does, a droop that does nothing of it left as little as the load."""
     loaded = model.with_effect("constant_load", {"load": 900.0})

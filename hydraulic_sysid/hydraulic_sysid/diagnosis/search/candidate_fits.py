@@ -156,7 +156,7 @@ class CandidateFits(Fitting):
             except SimulationError:
                 continue
             # What it is set against in the end is what it leaves at its best.
-            best = [_at_best(r, state) if r.name == tried.name else r for r in base.refits]
+            best = [at_best(r, state) if r.name == tried.name else r for r in base.refits]
             base.refits[:] = sorted(best, key=lambda r: r.misfit.total)
             if self.better(base, state) and enough(tried.name, state.misfit, 1.0):
                 found.append(state)
@@ -224,11 +224,11 @@ class CandidateFits(Fitting):
         return [CandidateRefit(s.effect.name, Refit(m, []), base.misfit) for s, m in zip(best, models, strict=True)]
 
 
-def _at_best(tried: CandidateRefit, state: SearchState) -> CandidateRefit:
+def at_best(tried: CandidateRefit, state: SearchState) -> CandidateRefit:
     """A refit, or where a fit to the end has left less, what that left."""
     if tried.misfit.total <= state.misfit.total:
-        return tried
-    return replace(tried, refit=replace(tried.refit, model=state.model), misfit=state.misfit)
+        return replace(tried, finished=True)
+    return replace(tried, refit=replace(tried.refit, model=state.model), misfit=state.misfit, finished=True)
 
 
 def varied(found: Sequence[T], effects: Sequence[Effect], most: int) -> list[T]:

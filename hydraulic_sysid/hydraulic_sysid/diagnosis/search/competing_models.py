@@ -23,7 +23,8 @@ class CompetingModel:
     """A model with the effect ``name`` in another's place.
 
     ``difference``: how much larger its sum of squares is, and ``odds`` of the other against it; ``collinearity``:
-    cosine between what the two effects change in the residuals beyond all free parameters; 1: the same.
+    cosine between what the two effects change in the residuals beyond all free parameters; 1: the same. ``finished``:
+    whether it was fitted to the end, not only with sensitivities that are held.
     """
 
     name: str
@@ -32,6 +33,7 @@ class CompetingModel:
     difference: float
     odds: float
     collinearity: float
+    finished: bool = False
 
     @property
     def distinguishable(self) -> bool:
@@ -53,7 +55,8 @@ def competing_models(name: str, without: SearchState, final: Misfit) -> list[Com
         difference = other.misfit.total - final.total
         cosine = _collinearity(without.linearisation, own, other.refit.model)
         model = other.refit.model
-        found.append(CompetingModel(other.name, model, other.misfit, difference, odds(final, difference), cosine))
+        against = odds(final, difference)
+        found.append(CompetingModel(other.name, model, other.misfit, difference, against, cosine, other.finished))
     return found
 
 

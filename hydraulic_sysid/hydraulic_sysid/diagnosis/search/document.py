@@ -98,6 +98,7 @@ def document(
                     "residual_after": c.misfit.rms_validation,
                     "chi_square_difference": c.difference,
                     "distinguishable": c.distinguishable,
+                    "fitted_to_the_end": c.finished,
                     "collinearity": c.collinearity,
                 }
                 for c in every

@@ -22,6 +22,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.fit import FitPoint
 from hydraulic_sysid.estimation.refinement import outlying
 
+from .candidate_fits import at_best
 from .candidates import candidates
 from .competing_models import competing_models
 from .criteria import CRITERIA
@@ -80,6 +81,7 @@ class Search(RecordingFits):
         try:
             searched = self.rivals_begun_anew(decisive(self.searched()))
             concluded = self.rivals_as_filed(self.concluded(searched, others=not self.quick))
+            concluded = concluded if self.quick else self.rivals_finished(concluded)
             concluded = self.set_against_effect(self.set_against_faults(concluded))
             found = accidents_named(self.by_force(self.with_other_gains(concluded)))
             if found.added and found.base.scores:  # not those beside the effects that were found last
@@ -132,12 +134,31 @@ class Search(RecordingFits):
                 base = replace(base, refits=again.refits, scores=again.scores) if len(found.added) == 1 else base
         return replace(found, competing=competing, base=base)
 
+    def rivals_finished(self, found: SearchResult) -> SearchResult:
+        """With every rival fitted to the end that a quick refit does not rule out by far.
+
+        That is where it explains at least half of what the effect does, and yet leaves what would tell it apart.
+        """
+        competing = dict(found.competing)
+        for name, without in found.competing.items():
+            apart = {c.name for c in competing_models(name, without, found.final.misfit) if c.distinguishable}
+            least = CRITERIA.most_of * (without.misfit.total - found.final.misfit.total)
+            refits = list(without.refits)
+            for i, r in enumerate(refits):
+                if r.finished or r.name not in apart or without.misfit.total - r.misfit.total < least:
+                    continue
+                self.say(f"fitting with {r.name}, to tell it from {name}")
+                with suppress(SimulationError):
+                    refits[i] = at_best(r, self.state(r.refit.model, self._last))
+            competing[name] = replace(without, refits=sorted(refits, key=lambda r: r.misfit.total))
+        return replace(found, competing=competing)
+
     def _begun_at(self, bare: SearchState, candidate: CandidateScore) -> CandidateRefit:
         """A candidate fitted to the end, from where its score is best on this state."""
         name = candidate.effect.name
         self.say(f"fitting with {name} once more")
         state = self.state(bare.model.with_effect(name).with_values(candidate.start), self._last)
-        return CandidateRefit(name, Refit(state.model, state.linearisation.costs), state.misfit)
+        return CandidateRefit(name, Refit(state.model, state.linearisation.costs), state.misfit, finished=True)
 
     def by_force(self, found: SearchResult) -> SearchResult:
         """With the effect that explains the force which is left, where a sensor shows more than any law is right to.

@@ -28,11 +28,15 @@ from .whiteness import Whiteness, whiteness
 
 @dataclass(frozen=True)
 class CandidateRefit:
-    """A candidate, refitted beside the effects that are on."""
+    """A candidate, refitted beside the effects that are on.
+
+    ``finished``: not by sensitivities that are held, which may stop short, but to the end.
+    """
 
     name: str
     refit: Refit
     misfit: Misfit
+    finished: bool = False
 
 
 @dataclass(frozen=True)
