@@ -177,8 +177,14 @@ class OneWrongNumber(DataSheetFits):
     def fewest_moved(self, final: SearchState, strict: object) -> tuple[SearchState, list[Deviation]]:
         return self.loose, [Deviation("piston_area_b", 1.0, 1.1, 0.01, 8000.0)]
 
-    def in_place_of(self, *_: object) -> tuple[SearchState, list[SearchState]]:
+    def stand_ins(self, *_: object) -> Any:
+        return None
+
+    def standing_in(self, *_: object) -> tuple[SearchState, list[SearchState]]:
         return self.strict, [self.effect]
+
+    def explore(self, base: SearchState, *_: object) -> SearchState:  # type: ignore[override]
+        return base
 
     def better(self, before: SearchState, after: SearchState) -> bool:
         return self.agreed
@@ -208,8 +214,36 @@ def test_what_effects_may_stand_for_follows_from_the_sensitivities(model: Model)
     at = Linearisation.of(model, fits.split)
     found = StandIns.of(at, {k: times * model.value(k) for k, times in off.items()}, record_features(at))
     enough = CRITERIA.significant
-    assert [key for key in off if found.any_for(key, enough)] == ["dead_volume_a", "dead_volume_b", "supply_pressure"]
+    assert [found.for_number(key, enough)[:1] for key in off] == [["sensor_offset"]] * 2 + [["pressure_offset"], []]
     assert ("dead_volume_a", "dead_volume_b") in found.sets(freedom=10.0)
+
+
+@pytest.mark.parametrize(
+    ("alone", "quick", "names", "tried"),
+    [
+        (1e5, False, ["pressure_offset"], ["pressure_offset"]),  # it shows well: what imitates it is near
+        (1e5, False, [], None),
+        (2e3, False, ["pressure_offset"], []),  # it hardly does: any effect may
+        (2e3, True, ["pressure_offset"], ["pressure_offset"]),
+        (2e3, True, [], None),
+    ],
+)
+def test_only_effects_that_stand_in_for_a_number_to_first_order_are_fitted_in_its_place(
+    model: Model, monkeypatch: pytest.MonkeyPatch, alone: float, quick: bool, names: list[str], tried: list[str] | None
+) -> None:
+    fits, seen = object.__new__(DataSheetFits), list[list[str]]()
+    fits.quick = quick
+
+    def in_place_of(*given: Any) -> tuple[Any, list[Any]]:
+        seen.append(list(given[5]) if len(given) > 5 else [])
+        return None, []
+
+    monkeypatch.setattr(DataSheetFits, "in_place_of", in_place_of)
+    number = Deviation("supply_pressure", 14.0e6, 14.1e6, 2e4, 900.0)
+    state = SearchState(model, cast(Linearisation, None), left(40_000.0), [])
+    stand_ins = cast(StandIns, SimpleNamespace(alone=lambda key: alone, for_number=lambda key, enough: names))
+    fits.standing_in(state, state, number, [number], stand_ins)
+    assert seen == ([] if tried is None else [tried])
 
 
 @pytest.mark.parametrize("own", [True, False])

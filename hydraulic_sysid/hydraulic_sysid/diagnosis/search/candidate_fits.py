@@ -92,6 +92,13 @@ class CandidateFits(Fitting):
         refits.sort(key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
 
+    def tried_with(self, base: SearchState, names: Sequence[str]) -> SearchState:
+        """A state with refits of these candidates."""
+        at = base.linearisation
+        scores = score(at, [c for c in candidates(base.model) if c.name in names], record_features(at))
+        refits = sorted(self.refitted(base, scores), key=lambda r: r.misfit.total)
+        return replace(base, refits=refits, scores=scores)
+
     def rounded(self, base: SearchState) -> SearchState:
         """A state with refits of the effects whose size records show by themselves.
 

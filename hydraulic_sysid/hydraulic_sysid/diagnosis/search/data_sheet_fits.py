@@ -62,19 +62,16 @@ class DataSheetFits(CandidateFits):
             return found
         strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
         done, moved = self.fewest_moved(final, strict if final is base else None)
-        stand_ins = self.stand_ins(done, moved) if others and len(moved) > (0 if found.added else 1) else None
-        tried = stand_ins.sets(done.misfit.freedom)[: CRITERIA.most_sets] if stand_ins is not None else []
+        stand_ins = self.stand_ins(done, moved) if moved and (others or not found.added) else None
+        tried = stand_ins.sets(done.misfit.freedom)[: CRITERIA.most_sets] if stand_ins is not None and others else []
         for keys in tried:
             simpler = self.simpler(found, strict, done, moved, keys)
             if simpler is not None:
                 return simpler
+        places = [self.standing_in(None if found.added else strict, done, d, moved, stand_ins) for d in moved]
         if found.added:
-            enough = least_cost(done.misfit.count, done.misfit.variance)
-            doubtful = [d for d in moved if stand_ins is not None and stand_ins.any_for(d.key, enough)]
-            instead = {d.key: self.in_place_of(None, done, [d], moved)[1] for d in doubtful}
-            moved = [replace(d, instead=_names(instead.get(d.key, []), done)) for d in moved]
+            moved = [replace(d, instead=_names(states, done)) for d, (_, states) in zip(moved, places, strict=True)]
         else:
-            places = [self.in_place_of(strict, done, [d], moved) for d in moved]
             every = [(state, i) for i, (_, states) in enumerate(places) for state in states]
             best, place = min(every, key=lambda pair: pair[0].misfit.total, default=(done, 0))
             # All numbers together may do what an effect does, too.
@@ -83,7 +80,8 @@ class DataSheetFits(CandidateFits):
             if clear and self.better(nearest, best) and not nothing_gained(nearest.misfit, best.misfit):
                 name = new_effect(best, strict)
                 return replace(
-                    found, base=strict, final=best, misfits={name: best.misfit}, competing={name: places[place][0]},
+                    found, base=strict, final=best, misfits={name: best.misfit},
+                    competing={name: self.explore(places[place][0], CRITERIA.later_refits)},
                     moved=tuple(d for i, d in enumerate(moved) if i != place),
                 )  # fmt: skip
             moved = [
@@ -172,16 +170,44 @@ class DataSheetFits(CandidateFits):
         """One of the numbers ``moved`` in a state."""
         return with_error(held.deviation(key, moved, state.model.value(key)), parameter_errors(state.linearisation))
 
+    def standing_in(
+        self,
+        strict: SearchState | None,
+        done: SearchState,
+        number: Deviation,
+        moved: Sequence[Deviation],
+        stand_ins: StandIns | None,
+    ) -> tuple[SearchState, list[SearchState]]:
+        """As `in_place_of`, of one number, by the effects that stand in for it to first order; else none does.
+
+        What hardly shows may be imitated by what is far from it: there all candidates are tried, but in a quick search or
+        beside other effects (no state is known then without any number moved, ``strict``).
+        """
+        if stand_ins is None:
+            return done, []
+        enough = least_cost(done.misfit.count, done.misfit.variance)
+        if stand_ins.alone(number.key) < CRITERIA.clear * enough and strict is not None and not self.quick:
+            return self.in_place_of(strict, done, [number], moved)
+        names = stand_ins.for_number(number.key, enough)
+        return self.in_place_of(strict, done, [number], moved, names) if names else (done, [])
+
     def in_place_of(
-        self, strict: SearchState | None, done: SearchState, taken: Sequence[Deviation], moved: Sequence[Deviation]
+        self,
+        strict: SearchState | None,
+        done: SearchState,
+        taken: Sequence[Deviation],
+        moved: Sequence[Deviation],
+        names: Sequence[str] = (),
     ) -> tuple[SearchState, list[SearchState]]:
         """The state with numbers ``taken`` back, and with effects that explain no less than they do.
 
-        ``done``: with all numbers ``moved``; ``strict``: with none, where that is known.
+        ``done``: with all numbers ``moved``; ``strict``: with none, where that is known; ``names``: of the effects, the
+        likeliest first (default: those that promise most).
         """
         others = [d.key for d in moved if d not in taken]
         back = self.with_moved(done, others) if others or strict is None else strict
-        without = self.explore(back, CRITERIA.later_refits)
+        likeliest = names[: CRITERIA.most_finished]
+        without = self.tried_with(back, likeliest) if likeliest else self.explore(back, CRITERIA.later_refits)
         promising = without.misfit.total - CRITERIA.promised * (without.misfit.total - done.misfit.total)
         found, near = [], [r for r in without.refits if r.misfit.total < promising][: CRITERIA.most_finished]
         most = (1.0 + CRITERIA.worse_look) * self.left_on_few(done) if near else 0.0

@@ -7,7 +7,7 @@ and without an effect that is free, too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
@@ -31,15 +31,15 @@ class StandIns:
     """Effects beside a fit in which numbers of the data sheet are others than the model file says.
 
     ``off`` (P,): by how much the file's values are, of the parameters' scales; ``places``: where these numbers are
-    among them; ``normal``: of the fit, and ``beside``: the same with what each effect brings; ``share``: of the sum of
-    squares that was looked at.
+    among them; ``normal``: of the fit, and ``beside``: the same with what each effect brings, in every shape that is
+    tried; ``share``: of the sum of squares that was looked at.
     """
 
     keys: tuple[str, ...]
     places: tuple[int, ...]
     off: Array
     normal: NormalEquations
-    beside: Mapping[str, NormalEquations]
+    beside: Mapping[str, Sequence[NormalEquations]]
     share: float
 
     @classmethod
@@ -50,7 +50,7 @@ class StandIns:
         off = np.array([(nominal.get(k, v) - v) for k, v in own.by_key.items()]) / own.scales
         effects = [e for e in candidates(at.model) if not observed(e)]
         found = zip(effects, results(lambda effect: _beside(part, effect, features), effects), strict=True)
-        beside = {e.name: normal for e, normal in found if normal is not None}
+        beside = {e.name: every for e, every in found if every}
         return cls(tuple(own.keys), tuple(own.keys.index(k) for k in nominal), off, part.normal, beside, share)
 
     def sets(self, freedom: float) -> list[tuple[str, ...]]:
@@ -70,33 +70,41 @@ class StandIns:
                 best[keys] = min(best.get(keys, np.inf), likely[chosen])
         return sorted(best, key=lambda keys: best[keys])
 
-    def any_for(self, key: str, enough: float) -> bool:
-        """Whether beside any effect it costs less than ``enough``, or hardly anything, to hold a number as it was."""
-        held = (self.keys.index(key),)
-        return any(self._cost(name, held) < enough or self._stands_for(name, held) for name in self.beside)
+    def for_number(self, key: str, enough: float) -> list[str]:
+        """Effects beside which it costs hardly anything to hold a number as it was, or half and less than ``enough``.
+
+        The likeliest first.
+        """
+        held, alone = (self.keys.index(key),), self.alone(key)
+        cost = {name: self._cost(name, held) for name in self.beside}
+        most = max(CRITERIA.rough * alone, min(enough, CRITERIA.most_of * alone))
+        return sorted((name for name in cost if cost[name] < most), key=lambda name: cost[name])
+
+    def alone(self, key: str) -> float:
+        """Sum of squares that it costs to hold a number as it was, without any effect."""
+        return _cost(self.normal, self.off, (self.keys.index(key),)) / self.share
 
     def _brought(self, name: str) -> int:
-        return len(self.beside[name].information) - len(self.off)
+        return min(len(normal.information) for normal in self.beside[name]) - len(self.off)
 
     def _cost(self, name: str, held: tuple[int, ...]) -> float:
-        off = np.concatenate((self.off, np.zeros(self._brought(name))))
-        return _cost(self.beside[name], off, held) / self.share
+        return min(_cost(normal, self.off, held) for normal in self.beside[name]) / self.share
 
     def _stands_for(self, name: str, held: tuple[int, ...]) -> bool:
         return self._cost(name, held) < CRITERIA.rough * _cost(self.normal, self.off, held) / self.share
 
 
-def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> NormalEquations | None:
-    """The normal equations with what an effect brings, at the probes of its first shape that run; None: none do."""
-    model = at.model.with_effect(effect.name)
+def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> list[NormalEquations]:
+    """The normal equations with what an effect brings, at the probes of each of its shapes that run."""
+    model, found = at.model.with_effect(effect.name), list[NormalEquations]()
     for group in probes(effect, features):
         with suppress(SimulationError):
-            return at.bordered(at.changes([Plant.for_fits(model.with_values(p.values)) for p in group]))
-    return None
+            found.append(at.bordered(at.changes([Plant.for_fits(model.with_values(p.values)) for p in group])))
+    return found
 
 
 def _cost(normal: NormalEquations, off: Array, held: tuple[int, ...]) -> float:
-    """Sum of squares that it costs to move the parameters ``held`` by ``off`` (P,), the others free to follow."""
-    others = np.setdiff1d(np.arange(len(off)), held)
+    """Sum of squares that it costs to move the parameters ``held`` by ``off`` (P,), all others free to follow."""
+    others = np.setdiff1d(np.arange(len(normal.information)), held)
     moved = normal.subset(np.concatenate((others, held))).marginal(len(others))
     return max(float(off[list(held)] @ moved.information @ off[list(held)]), 0.0)
