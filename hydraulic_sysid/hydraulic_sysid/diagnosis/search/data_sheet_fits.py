@@ -180,8 +180,8 @@ class DataSheetFits(CandidateFits):
     ) -> tuple[SearchState, list[SearchState]]:
         """As `in_place_of`, of one number, by the effects that stand in for it to first order; else none does.
 
-        What hardly shows may be imitated by what is far from it: there all candidates are tried, but in a quick search or
-        beside other effects (no state is known then without any number moved, ``strict``).
+        What hardly shows may be imitated by what is far from it: there all candidates are tried, but not in a quick
+        search, nor beside effects (without a ``strict`` state).
         """
         if stand_ins is None:
             return done, []
