@@ -1,10 +1,11 @@
 """The constants of the search: all that decides which fits are made, which effect is named and what is said.
 
-Each has its unit and its reason, and what becomes of benches where it is half or twice as large (of a share above a half:
-what it lacks to 1; of a residual: what it has beyond). Of 13 benches of the family, which nothing was chosen on (seed
-111001, quick diagnoses), on so many something would be decided otherwise on the way; the six quickest of these were
-diagnosed again, and so many verdicts are others. Of how much is done two benches show it. `benchmarks/criteria.py`
-measures that, and as much on others.
+Each has its unit and its reason, and what becomes of benches where it is half or twice as large (of a share above a
+half: what it lacks to 1; of a residual: what it has beyond). Of 13 benches of the family, which nothing was chosen on
+(seed 111001, quick diagnoses), on so many something would be decided otherwise on the way; the six quickest of these
+were diagnosed again, and so many verdicts are others. Of how much is done two benches show it.
+`benchmarks/criteria.py` measures that, and as much on others.
+
 What only a method needs (grids, steps, orders of filters) stands with it.
 """
 
