@@ -276,7 +276,7 @@ def test_a_further_effect_that_a_curve_beats_is_none(
     monkeypatch.setattr(f"{place}.nonparametric_curves", lambda *_: times.append("taken") or curves)
     done = search.forward(state(model, 60000.0, {}))
     assert done.added == ["valve_deadband", "load_spring"][:named]
-    assert asked[0] == pytest.approx(0.8 * share)
+    assert asked[0] == pytest.approx(CRITERIA.nearly * share)
     assert search.curves(one, lambda _: None) is curves and times == ["taken"], "those of a state are taken once"
 
 
