@@ -27,13 +27,13 @@ from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit, refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
-from hydraulic_sysid.diagnosis.search.number_sets import StandIns
 from hydraulic_sysid.diagnosis.search.recording_faults import RecordingFault
 from hydraulic_sysid.diagnosis.search.recording_fits import RecordingFits
 from hydraulic_sysid.diagnosis.search.score_test import score
 from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState
 from hydraulic_sysid.diagnosis.search.spectral_lines import record_features
+from hydraulic_sysid.diagnosis.search.stand_ins import StandIns
 from hydraulic_sysid.diagnosis.search.uncertainty import parameter_errors
 from hydraulic_sysid.diagnosis.search.worth import anything
 from hydraulic_sysid.estimation.fit import Fit, FitSettings

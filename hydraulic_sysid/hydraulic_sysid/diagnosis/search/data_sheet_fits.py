@@ -19,9 +19,9 @@ from .criteria import CRITERIA
 from .data_sheet import Deviation, HeldNumbers, least_cost, relaxed, restored, stretched, with_error
 from .fitting import worse
 from .misfit import explained, reduction
-from .number_sets import StandIns
 from .search_state import SearchResult, SearchState
 from .spectral_lines import record_features
+from .stand_ins import StandIns
 from .uncertainty import parameter_errors
 from .worth import borrowed, nothing_gained
 

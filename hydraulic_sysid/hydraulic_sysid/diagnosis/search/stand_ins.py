@@ -60,10 +60,11 @@ class StandIns:
         """
         sizes = range(2, len(self.places) + 1)
         sets = [held for size in sizes for held in combinations(self.places, size)]
+        nothing = {held: CRITERIA.rough * self._alone(held) for held in sets}
         best: dict[tuple[str, ...], float] = {}
         for name in self.beside:
-            simpler = [h for h in sets if len(h) > self._brought(name) and self._stands_for(name, h)]
-            likely = {h: self._cost(name, h) - len(h) * freedom for h in simpler}
+            cost = {held: self._cost(name, held) for held in sets if len(held) > self._brought(name)}
+            likely = {held: own - len(held) * freedom for held, own in cost.items() if own < nothing[held]}
             if likely:
                 chosen = min(likely, key=lambda held: likely[held])
                 keys = tuple(self.keys[i] for i in chosen)
@@ -82,16 +83,16 @@ class StandIns:
 
     def alone(self, key: str) -> float:
         """Sum of squares that it costs to hold a number as it was, without any effect."""
-        return _cost(self.normal, self.off, (self.keys.index(key),)) / self.share
+        return self._alone((self.keys.index(key),))
+
+    def _alone(self, held: tuple[int, ...]) -> float:
+        return _cost(self.normal, self.off, held) / self.share
 
     def _brought(self, name: str) -> int:
         return min(len(normal.information) for normal in self.beside[name]) - len(self.off)
 
     def _cost(self, name: str, held: tuple[int, ...]) -> float:
         return min(_cost(normal, self.off, held) for normal in self.beside[name]) / self.share
-
-    def _stands_for(self, name: str, held: tuple[int, ...]) -> bool:
-        return self._cost(name, held) < CRITERIA.rough * _cost(self.normal, self.off, held) / self.share
 
 
 def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> list[NormalEquations]:
