@@ -118,7 +118,7 @@ def test_numbers_that_say_the_same_are_named_together(model: Model) -> None:
 
 
 def test_outside_the_library_is_that_none_of_these_is_right(model: Model) -> None:
-    found = explanations(result(model, 40.0, 35.0, "constant_load"), verdict(OUTSIDE, "constant_load"))
+    found = explanations(result(model, 60.0, 59.0, "constant_load"), verdict(OUTSIDE, "constant_load"))
     assert found[0].named and not found[0].library and not any(e.named for e in found[1:])
     assert sentence(found) == "The probability of this verdict is over 99 %."
     little = result(model, 1.2, 1.0)
