@@ -198,6 +198,16 @@ class OneWrongNumber(DataSheetFits):
         return list(found.misfits), [d.key for d in found.moved]
 
 
+def test_beside_an_effect_what_stands_in_for_a_number_is_named_with_it(model: Model) -> None:
+    fits = OneWrongNumber(model, less=400.0)
+    found = SearchResult(
+        model, cast(Split, None), FitSettings(), fits.loose, fits.loose, {"constant_load": fits.loose.misfit}, {}
+    )
+    done = fits.concluded(found, others=False)
+    assert done.added == ["constant_load"] and done.final is fits.loose
+    assert [(d.key, d.instead) for d in done.moved] == [("piston_area_b", ("friction_asymmetry",))]
+
+
 def test_an_effect_that_leaves_less_than_the_whole_data_sheet_is_the_verdict(model: Model) -> None:
     assert OneWrongNumber(model, less=400.0).named == (["friction_asymmetry"], [])
     assert OneWrongNumber(model, less=40.0).named == ([], ["piston_area_b"])  # it may be either
