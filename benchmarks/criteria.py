@@ -30,7 +30,7 @@ OUT = ROOT / "runs" / "criteria"
 WHICH = ("half", "double")
 ONLY_SAID = ("shared", "law_error", "shape_error", "vague_value", "surest")
 """Constants of the errors that are stated: no verdict follows from them."""
-EFFORT = tuple(f.name for f in fields(Criteria) if f.metadata.get("effort"))
+EFFORT = tuple(f.name for f in fields(Criteria) if f.metadata["effort"])
 """Constants that say how much is done: they are varied on the first benches (``--effort``)."""
 PROBABILITIES = ("odds", "distinct", "law", "most_power", "unknown_laws", "noise_missed")
 """Constants that become plain numbers only where probabilities are stated; what they decide is compared before."""
@@ -43,7 +43,7 @@ def half_and_double(name: str) -> dict[str, float]:
         return {"half": max(value // 2, 1), "double": 2 * value}
     if 0.5 <= value < 1.0:
         return {"half": 1.0 - 2.0 * (1.0 - value) if value > 0.5 else 0.25, "double": 1.0 - 0.5 * (1.0 - value)}
-    if 1.0 < value < 1.5 and name in ("little", "small"):
+    if name in ("little", "small"):
         return {"half": 1.0 + 0.5 * (value - 1.0), "double": 1.0 + 2.0 * (value - 1.0)}
     return {"half": 0.5 * value, "double": 2.0 * value}
 
@@ -70,20 +70,12 @@ def run(task: tuple[str, Path, bool, Label | None]) -> dict[str, Any]:
     records, model = read_all(sorted(place.glob("*.csv.gz"))), load_model(place / "model.yaml")
     result = plain(diagnose(model, records, quick=quick).result)
     marks = scoring.judge(json.loads((place / "answer.json").read_text()), result)
-    right = bool(marks["verdict_right"])
+    said = " ".join([marks["verdict"], *sorted([*marks["named"], *marks["said"]])])
     took = time.perf_counter() - begin
     return {
-        "bench": name, "said": said(result), "right": right, "seconds": took,
+        "bench": name, "said": said, "right": bool(marks["verdict_right"]), "seconds": took,
         "noted": sorted(noted), "lost": sorted(lost - noted),
     }  # fmt: skip
-
-
-def said(result: dict[str, Any]) -> str:
-    """Verdict, effects, numbers and faults in a line."""
-    names = [e["name"] for e in result["effects"] if e["added"]]
-    names += [d["key"] for d in result.get("data_sheet", ())]
-    names += [f["name"] for f in result.get("recording", {}).get("faults", ())]
-    return " ".join([result["verdict"]["kind"], *sorted(names)])
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -44,7 +44,7 @@ def _said(result: dict[str, Any]) -> list[str]:
     return [d["key"] for d in result.get("data_sheet", ())] + faults + ["spikes"] * bool(recording.get("spikes"))
 
 
-def _or(result: dict[str, Any]) -> list[str]:
+def _alternatives(result: dict[str, Any]) -> list[str]:
     """What a verdict says may be in the place of a number or a fault."""
     numbers = [other["key"] for d in result.get("data_sheet", ()) for other in d.get("alternatives", ())]
     faults = result.get("recording", {}).get("faults", ())
@@ -106,7 +106,7 @@ def judge(answer: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
     # A tie is right where the truth is among what it names.
     marks["true_among"] = kind == TIE and bool(true) and set(true) <= {*names, *result["verdict"].get("effects", ())}
     if answer["kind"] in (DATUM, RECORDING) and kind in (DATA_SHEET, RECORDING):
-        marks["true_among"] = any(name in _or(result) for name in answer["said"][0])
+        marks["true_among"] = any(name in _alternatives(result) for name in answer["said"][0])
     marks["verdict_right"] = bool(marks[RIGHT[answer["kind"]]]) or marks["true_among"]
     return marks
 

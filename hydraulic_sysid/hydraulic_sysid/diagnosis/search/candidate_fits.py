@@ -92,11 +92,10 @@ class CandidateFits(Fitting):
         refits.sort(key=lambda r: r.misfit.total)
         return replace(base, linearisation=at.slim(), refits=refits, scores=scores)
 
-    def tried_with(self, base: SearchState, names: Sequence[str]) -> SearchState:
-        """A state with refits of these candidates."""
-        at = base.linearisation
-        scores = score(at, [c for c in candidates(base.model) if c.name in names], record_features(at))
-        refits = sorted(self.refitted(base, scores), key=lambda r: r.misfit.total)
+    def tried_with(self, base: SearchState, effects: Sequence[Effect], full: int | None = None) -> SearchState:
+        """A state with refits of these candidates, the best first; ``full`` as `refitted` takes it."""
+        scores = score(base.linearisation, effects, record_features(base.linearisation))
+        refits = sorted(self.refitted(base, scores, full), key=lambda r: r.misfit.total)
         return replace(base, refits=refits, scores=scores)
 
     def rounded(self, base: SearchState) -> SearchState:
@@ -104,9 +103,7 @@ class CandidateFits(Fitting):
 
         Such as rounding pass for noise, so that they count even where nothing else is left.
         """
-        at = base.linearisation
-        scores = score(at, [c for c in candidates(base.model) if observed(c)], record_features(at))
-        return replace(base, refits=list(self.refitted(base, scores, full=0)), scores=scores)
+        return self.tried_with(base, [c for c in candidates(base.model) if observed(c)], full=0)
 
     def _show(self, base: SearchState, scores: Sequence[CandidateScore], refits: Sequence[CandidateRefit]) -> None:
         self.say.watch({"candidates": candidate_table(base, scores, refits, self._added(base.model))})

@@ -13,7 +13,7 @@ from hydraulic_sim.plant import Plant
 from .criteria import CRITERIA
 from .linearisation import Linearisation
 from .misfit import Misfit
-from .search_state import SearchState
+from .search_state import CandidateRefit, SearchState
 
 _MOST = 5
 
@@ -41,6 +41,16 @@ class CompetingModel:
         return self.odds > CRITERIA.odds
 
 
+def nearest(name: str, without: SearchState) -> list[CandidateRefit]:
+    """What comes nearest in the place of ``name``, which is empty in ``without``."""
+    return without.others(name)[:_MOST]
+
+
+def told_apart(final: Misfit, other: Misfit) -> bool:
+    """Whether the data decide against a model that leaves ``other``."""
+    return odds(final, other.total - final.total) > CRITERIA.odds
+
+
 def odds(misfit: Misfit, difference: float) -> float:
     """Of a model that leaves ``misfit`` against one that leaves this ``difference`` more of the sum of squares."""
     needed = CRITERIA.distinct * misfit.variance + CRITERIA.law * misfit.excess
@@ -51,7 +61,7 @@ def competing_models(name: str, without: SearchState, final: Misfit) -> list[Com
     """The competitors of ``name``, whose place in the fitted model is empty in ``without``; the closest first."""
     own = next((r.refit.model for r in without.refits if r.name == name), None)
     found = []
-    for other in without.others(name)[:_MOST]:
+    for other in nearest(name, without):
         difference = other.misfit.total - final.total
         cosine = _collinearity(without.linearisation, own, other.refit.model)
         model = other.refit.model

@@ -13,17 +13,16 @@ What only a method needs (grids, steps, orders of filters) stands with it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 
-def _constant(value: float, unit: str, reason: str, half: str = "", double: str = "") -> Any:
-    return field(default=value, metadata={"unit": unit, "reason": reason, "half": half, "double": double})
+def _constant(value: float, unit: str, reason: str, half: str, double: str, effort: bool = False) -> Any:
+    said = {"unit": unit, "reason": reason, "half": half, "double": double}
+    return field(default=value, metadata={**said, "effort": effort})
 
 
-def _effort(value: float, unit: str, reason: str, half: str = "", double: str = "") -> Any:
-    """A constant that says how much is done before something is decided."""
-    own = _constant(value, unit, reason, half, double)
-    return field(default=value, metadata={**own.metadata, "effort": True})
+_effort = partial(_constant, effort=True)  # what says how much is done before something is decided
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy as np
 from hydraulic_sim.errors import SimulationError
 
 from .candidate_fits import CandidateFits
+from .candidates import candidates
 from .criteria import CRITERIA
 from .data_sheet import Deviation, HeldNumbers, least_cost, relaxed, restored, stretched, with_error
 from .fitting import worse
@@ -206,7 +207,7 @@ class DataSheetFits(CandidateFits):
         """
         others = [d.key for d in moved if d not in taken]
         back = self.with_moved(done, others) if others or strict is None else strict
-        likeliest = names[: CRITERIA.most_finished]
+        likeliest = [e for e in candidates(back.model) if e.name in names[: CRITERIA.most_finished]]
         without = self.tried_with(back, likeliest) if likeliest else self.explore(back, CRITERIA.later_refits)
         promising = without.misfit.total - CRITERIA.promised * (without.misfit.total - done.misfit.total)
         found, near = [], [r for r in without.refits if r.misfit.total < promising][: CRITERIA.most_finished]

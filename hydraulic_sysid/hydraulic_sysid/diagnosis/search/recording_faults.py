@@ -161,12 +161,7 @@ class RecordingFault:
 
 
 def other_gains(fault: RecordingFault, channels: AbstractSet[str]) -> list[RecordingFault]:
-    """Gains of the other readings that would make up for a gain; none of a fault of another kind.
-
-    ``channels``: of all records.
-    """
-    if isinstance(fault.hypothesis, DriveHypothesis) or fault.hypothesis.what != "gain":
-        return []
+    """Gains of the other readings that would make up for a gain; ``channels``: of all records."""
     others = [h for h in HYPOTHESES if h.what == "gain" and h is not fault.hypothesis and h.shown_by(channels)]
     return [replace(fault, hypothesis=h, size=-fault.size, alternatives=()) for h in others]
 

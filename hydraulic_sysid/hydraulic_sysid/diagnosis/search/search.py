@@ -24,7 +24,7 @@ from hydraulic_sysid.estimation.refinement import outlying
 
 from .candidate_fits import at_best
 from .candidates import candidates
-from .competing_models import competing_models
+from .competing_models import competing_models, nearest, told_apart
 from .criteria import CRITERIA
 from .data_sheet import restored, tolerances
 from .data_sheet_fits import new_effect, new_effects
@@ -139,18 +139,17 @@ class Search(RecordingFits):
 
         That is where it explains at least half of what the effect does, and yet leaves what would tell it apart.
         """
-        competing = dict(found.competing)
+        competing, final = dict(found.competing), found.final.misfit
         for name, without in found.competing.items():
-            apart = {c.name for c in competing_models(name, without, found.final.misfit) if c.distinguishable}
-            least = CRITERIA.most_of * (without.misfit.total - found.final.misfit.total)
-            refits = list(without.refits)
-            for i, r in enumerate(refits):
-                if r.finished or r.name not in apart or without.misfit.total - r.misfit.total < least:
-                    continue
-                self.say(f"fitting with {r.name}, to tell it from {name}")
-                with suppress(SimulationError):
-                    refits[i] = at_best(r, self.state(r.refit.model, self._last))
-            competing[name] = replace(without, refits=sorted(refits, key=lambda r: r.misfit.total))
+            least = CRITERIA.most_of * (without.misfit.total - final.total)
+            best = {r.name: r for r in without.refits}
+            for r in nearest(name, without):
+                near = without.misfit.total - r.misfit.total >= least
+                if near and told_apart(final, r.misfit) and not r.finished:
+                    self.say(f"fitting with {r.name}, to tell it from {name}")
+                    with suppress(SimulationError):
+                        best[r.name] = at_best(r, self.state(r.refit.model, self._last))
+            competing[name] = replace(without, refits=sorted(best.values(), key=lambda r: r.misfit.total))
         return replace(found, competing=competing)
 
     def _begun_at(self, bare: SearchState, candidate: CandidateScore) -> CandidateRefit:

@@ -86,13 +86,13 @@ class StandIns:
         return self._alone((self.keys.index(key),))
 
     def _alone(self, held: tuple[int, ...]) -> float:
-        return _cost(self.normal, self.off, held) / self.share
+        return _cost_of_holding(self.normal, self.off, held) / self.share
 
     def _brought(self, name: str) -> int:
         return min(len(normal.information) for normal in self.beside[name]) - len(self.off)
 
     def _cost(self, name: str, held: tuple[int, ...]) -> float:
-        return min(_cost(normal, self.off, held) for normal in self.beside[name]) / self.share
+        return min(_cost_of_holding(normal, self.off, held) for normal in self.beside[name]) / self.share
 
 
 def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> list[NormalEquations]:
@@ -104,7 +104,7 @@ def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> list
     return found
 
 
-def _cost(normal: NormalEquations, off: Array, held: tuple[int, ...]) -> float:
+def _cost_of_holding(normal: NormalEquations, off: Array, held: tuple[int, ...]) -> float:
     """Sum of squares that it costs to move the parameters ``held`` by ``off`` (P,), all others free to follow."""
     others = np.setdiff1d(np.arange(len(normal.information)), held)
     moved = normal.subset(np.concatenate((others, held))).marginal(len(others))

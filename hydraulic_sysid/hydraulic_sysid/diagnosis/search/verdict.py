@@ -154,7 +154,7 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
         return OUTSIDE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
-    no_law = bool(curves) and all(c.share < CRITERIA.details for c in curves)
+    no_law = nowhere(curves)
     details = final.variance < CRITERIA.small or no_law
     if final.usual > CRITERIA.right_law and any(c.share > CRITERIA.most_of for c in curves):
         return OUTSIDE
@@ -314,7 +314,7 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
     else:
         text += f"On validation data the residual is {final:.3g} × noise. "
     best = curves[0] if curves and drift is None else elsewhere(result, curves)
-    if best is not None and nowhere([best]):
+    if nowhere(curves):
         text += (
             f"No curve at any place of the plant would explain {100 * CRITERIA.details:.0f} % of it: "
             "it may be in how the motion is read."
