@@ -6,6 +6,8 @@ The plant is the independent one (hidden_effects/): a press axis in closed loop 
 actuator), four records of 10 s at 1 kHz, and a model file with the physics complete. Every row gets one fault of the
 sensors, the logger or the data sheet, or none; printed are what should be said, what `diagnose` says, and whether that
 is right. Right is: the fault named where it is of a kind that can be named, else "complete"; an effect is never right.
+In the rows on noise there is noise of one kind in the sensors and nothing else, and the residual must be 0.95 … 1.05 ×
+it as well.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
 from hidden_effects import benches, sensors
 from hidden_effects.settings import Setting
@@ -33,12 +35,16 @@ PRESSURES = ("pressure_a_Pa", "pressure_b_Pa")
 POLE = 60.0  # Hz, of the slow transducers
 DRIVE_NOISE = 0.02  # V
 SPIKES = 5e-4  # share of the samples
+NOISE = {"position_m": 2e-5, **dict.fromkeys(PRESSURES, 2e4)}  # m, Pa: rms, of the press axis
+STEPS = {name: 25e6 / 2**12 for name in PRESSURES} | {"position_m": 0.5 / 2**12}  # Pa, m: of 12-bit converters
+LEVEL = (0.95, 1.05)  # residual over noise of an exact model
 
 
 @dataclass(frozen=True)
 class Row:
     """``change``: what is done to the tables; ``kinds``: verdicts that are right; ``said``: of which one must be named
-    (empty: none need be); ``sheet``: data-sheet values of the model file over the true ones."""
+    (empty: none need be); ``level``: whether the residual must be that of an exact model; ``sheet``: data-sheet values
+    of the model file over the true ones."""
 
     title: str
     change: Callable[[Tables, np.random.Generator], Tables] = lambda tables, _: tables
@@ -47,6 +53,7 @@ class Row:
     sensors: str = "white"
     geometry: str = "press"
     noise: bool = True
+    level: bool = False
     sheet: dict[str, float] = field(default_factory=dict)
 
 
@@ -103,6 +110,51 @@ def short(table: dict[str, np.ndarray], _: np.random.Generator) -> dict[str, np.
     return {name: values[1000:3000] for name, values in table.items()}
 
 
+def noisy(kind: Callable[[np.random.Generator, int], np.ndarray]) -> Any:
+    """Noise of a kind, n samples of unit variance, on every channel of every record."""
+
+    def change(table: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
+        return {n: v + NOISE[n] * kind(rng, len(v)) if n in NOISE else v for n, v in table.items()}
+
+    return each(change)
+
+
+def white(rng: np.random.Generator, samples: int) -> np.ndarray:
+    return rng.standard_normal(samples)
+
+
+def low_passed(order: int, corner: float) -> Callable[[np.random.Generator, int], np.ndarray]:
+    def kind(rng: np.random.Generator, samples: int) -> np.ndarray:
+        found = lfilter(*butter(order, corner, fs=sensors.RATE), white(rng, samples + sensors.SETTLE))[sensors.SETTLE :]
+        return found / found.std()
+
+    return kind
+
+
+def hum(rms: float) -> Callable[[np.random.Generator, int], np.ndarray]:
+    def kind(rng: np.random.Generator, samples: int) -> np.ndarray:
+        phase = 2.0 * np.pi * (50.02 * np.arange(samples) / sensors.RATE + rng.random())
+        return white(rng, samples) + np.sqrt(2.0) * rms * np.sin(phase)
+
+    return kind
+
+
+def outliers(rng: np.random.Generator, samples: int) -> np.ndarray:
+    found = white(rng, samples)
+    sensors.spiked(found, rng, 1e-3, 50.0)
+    return found
+
+
+def converted(table: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Each channel with noise of a third of its converter's step, in steps."""
+    noise = {n: STEPS[n] / 3.0 * white(rng, len(v)) for n, v in table.items() if n in STEPS}
+    return {n: STEPS[n] * np.round((v + noise[n]) / STEPS[n]) if n in STEPS else v for n, v in table.items()}
+
+
+def noise_alone(title: str, change: Any, **other: Any) -> Row:
+    return Row(f"noise: {title}", change, noise=False, level=True, **other)
+
+
 LATE_DRIVE = ("drive", "position")  # one clock against the other: which is late cannot be told
 ROWS = (
     Row("filtered pressures, hum, 12-bit converters", sensors="real"),
@@ -121,6 +173,12 @@ ROWS = (
     Row("a small fast actuator", geometry="small"),
     Row("one pressure only", each(one_pressure)),
     Row("records of 2 s", each(short)),
+    noise_alone("white", noisy(white)),
+    *(noise_alone(f"low pass of order 2, {f:g} Hz", noisy(low_passed(2, f))) for f in (400.0, 200.0, 100.0)),
+    noise_alone("low pass of order 4, 400 Hz", noisy(low_passed(4, 400.0))),
+    *(noise_alone(f"hum of {rms:g} of the noise", noisy(hum(rms))) for rms in (0.5, 1.0, 3.0)),
+    noise_alone("0.1 % outliers of 50 times the noise", noisy(outliers), kinds=(COMPLETE, RECORDING), said=("spikes",)),
+    noise_alone("steps of 12 bits", each(converted)),
 )
 
 
@@ -158,9 +216,11 @@ def run(task: tuple[int, int]) -> dict[str, Any]:
     said = [d["key"] for d in result.get("data_sheet", ())] + [f["name"] for f in recording.get("faults", ())]
     said += ["spikes"] * bool(recording.get("spikes"))
     kind = result["verdict"]["kind"]
+    level = [result["residual"]["after"][role] for role in ("fit", "validation")]
     right = kind in row.kinds and (not row.said or any(name in said for name in row.said))
+    right &= not row.level or all(LEVEL[0] <= one <= LEVEL[1] for one in level)
     return {
-        "title": row.title, "seed": seed, "kind": kind, "said": said, "right": right,
+        "title": row.title, "seed": seed, "kind": kind, "said": said, "right": right, "level": level,
         "effects": [e["name"] for e in result["effects"] if e["added"]],
         "seconds": time.perf_counter() - begin, "text": result["verdict"]["text"],
     }  # fmt: skip
@@ -179,7 +239,8 @@ def main(argv: list[str] | None = None) -> int:
         for one in pool.imap(run, tasks):
             found.append(one)
             mark = "right" if one["right"] else "WRONG"
-            print(f"{mark}  {one['title']} (seed {one['seed']}, {one['seconds']:.0f} s)")
+            print(f"{mark}  {one['title']} (seed {one['seed']}, {one['seconds']:.0f} s, "
+                  f"{one['level'][0]:.3f} and {one['level'][1]:.3f} × noise where fitted and validated)")
             print(f"       {one['text']}", flush=True)
     print(f"{sum(one['right'] for one in found)} of {len(found)} right")
     return 0

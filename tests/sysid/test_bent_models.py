@@ -52,11 +52,11 @@ def model() -> Model:
     return load_model("sample_bench")
 
 
-def swept(model: Model, height: float = 3.0) -> Record:
-    """The bench under a sweep of so many volts, with noise of 2 µm and 1 kPa."""
+def swept(model: Model, height: float = 3.0, fast: float = 2.0) -> Record:
+    """The bench under a sweep of so many volts that gets so ``fast`` [Hz/s], with noise of 2 µm and 1 kPa."""
     rng = np.random.default_rng(5)
     t = DT * np.arange(round(SECONDS / DT))
-    drive = height * np.sin(2.0 * np.pi * (0.5 + 2.0 * t) * t)
+    drive = height * np.sin(2.0 * np.pi * (0.5 + fast * t) * t)
     run = Plant(model).simulate(drive, DT)
     noise = {"position": 2e-6, "pressure_a": 1e3, "pressure_b": 1e3}
     channels = {c: np.asarray(getattr(run, c)) + rng.normal(0.0, s, t.size) for c, s in noise.items()}
@@ -68,6 +68,16 @@ def test_a_probe_that_goes_too_far_is_tried_nearer(model: Model) -> None:
     at = Linearisation.of(model, split([record], [], model, 0.5))
     (found,) = score(at, [model.library["hose_compliance"]], RecordFeatures())
     assert found.start["hose_compliance.capacity"] == pytest.approx(CAPACITY, rel=0.3)  # by usual sizes a tenth of it
+
+
+def test_what_usual_sizes_hardly_touch_is_tried_larger(model: Model) -> None:
+    """A spool that takes two thirds of a second from end to end, where thirty times a second is usual."""
+    name, rate = "spool_rate_limit", 1.5
+    record = swept(model.with_effect(name, {"rate": rate}), 2.0, 0.1)
+    at = Linearisation.of(model, split([record], [], model, 0.5))
+    (found,) = score(at, [model.library[name]], RecordFeatures())
+    (probe,) = (start[f"{name}.rate"] for start in found.others)
+    assert probe < 3.0 * rate  # a refit that does not get on from the prediction begins there
 
 
 @pytest.mark.parametrize(("codes", "sensor"), [(4096, False), (1500, True)])

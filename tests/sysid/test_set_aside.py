@@ -70,6 +70,15 @@ def test_a_rest_at_the_largest_reading_is_no_clipping(
     assert not at_end_of_range(np.round(turning / step) * step if step else turning).any()
 
 
+@pytest.mark.parametrize("end", [1.0, -1.0])
+def test_noise_of_less_than_a_step_is_not_cut_off_at_a_level(end: float) -> None:
+    """Rounded, it leans to the side on which the next level is."""
+    draw = np.random.default_rng(7)
+    rest = -0.25 + 0.3 * draw.standard_normal(4000)
+    moving = np.linspace(-300.0, 0.0, 4000) + 0.3 * draw.standard_normal(4000)
+    assert not at_end_of_range(np.round(end * np.concatenate((moving, rest)))).any()
+
+
 def test_what_is_set_aside_is_in_no_segment(model: Model, true_position: tuple[Array, Array]) -> None:
     drive, position = true_position
     end = 0.5 * STROKE - 0.01

@@ -70,14 +70,19 @@ def _cut_off(y: Array) -> Mask:
     """Rests near the largest value, if the noise of one of them is cut off towards it."""
     near = y > y.max() - NEAR * float(np.ptp(y))
     rests = [(first, last) for first, last in runs(near) if last - first >= RESTS]
-    return near if any(_skewed(y[first:last]) for first, last in rests) else np.zeros(y.size, dtype=bool)
+    step = max(resolution(y), _between_levels(y)) if rests else 0.0
+    cut = any(_skewed(y[first:last], step) for first, last in rests)
+    return near if cut else np.zeros(y.size, dtype=bool)
 
 
-def _skewed(rest: Array) -> bool:
-    """Whether the noise in the middle half of a rest (n,) is bounded above and not below."""
+def _skewed(rest: Array, step: float) -> bool:
+    """Whether the noise in the middle half of a rest (n,) is bounded above and not below.
+
+    Noise of less than a ``step`` between levels says nothing: rounded, it leans to where its mean is not.
+    """
     quarter = rest.size // 4
     off = rest[quarter:-quarter] - rest[quarter:-quarter].mean()
-    if not np.ptp(off) > 0.0:
+    if not off.std() > step:
         return False
     # Neighbours of a smoothed signal say the same: it is worth about as many samples as it changes its sign.
     worth = max(int(np.count_nonzero(np.diff(np.signbit(off)))), 1)

@@ -405,6 +405,10 @@ class Criteria:
         1.0, "times what is left", "a probe that changes more is no first order",
         "11 of 13, no verdict", "11 of 13, no verdict",
     )  # fmt: skip
+    too_near: float = _effort(
+        0.01, "times what is left", "below which all probes change, larger ones are tried",
+        "not measured", "not measured",
+    )  # fmt: skip
     starts_as_well: float = _effort(
         0.5, "share of the best prediction", "from which another shape is a start as well",
         "12 of 13, no verdict", "13 of 13, no verdict",

@@ -76,7 +76,7 @@ def _score(at: Linearisation, one: Linearisation, effect: Effect, features: Reco
         return [p for p in every if p is not None]
 
     tried = [predictions(SIZES)]
-    if not tried[0]:
+    if max((p.change for p in tried[0]), default=0.0) < CRITERIA.too_near:
         tried.append(predictions(LARGE))
     if not tried[-1] or min(p.change for p in tried[-1]) > CRITERIA.too_far:
         tried.append(predictions(SMALL))
