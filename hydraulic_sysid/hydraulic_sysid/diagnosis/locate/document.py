@@ -45,13 +45,12 @@ def balance_figures(model: Model, records: Sequence[Record]) -> list[dict[str, A
 
 
 def locate(
-    model: Model, records: Sequence[Record], progress: Callable[[str], None] | None = None, maps: bool = True
+    model: Model, records: Sequence[Record], progress: Callable[[str], None] | None = None
 ) -> dict[str, Any]:
     """Result document (see docs/report-json.md) of a calibrated model's balances on records; arrays NumPy, SI.
 
     Best on a model that was calibrated; what a fit may move may still move, to first order, before anything is
-    attributed to a subsystem. ``maps=False`` leaves out the maps, spectra and correlations, for callers that want the
-    ranking.
+    attributed to a subsystem.
 
     :raises LocateError: no record, or one that lacks drive or position or is too short.
     :raises hydraulic_sim.errors.SimulationError: when the model cannot be run along a record.
@@ -80,10 +79,10 @@ def locate(
             {"name": r.name, "source": str(r.source), "duration": r.duration, "samples": len(r)} for r in records
         ],
         "not_formed": _not_formed(model, records, names),
-        "balances": balance_entries(studied, names, maps) if studied else [],
+        "balances": balance_entries(studied, names, maps=True) if studied else [],
         "misfit": None if found is None else _misfit(found),
         "attribution": [] if found is None else _shares(found),
-        "whiteness": whiteness(studied, names) if maps and studied else {},
+        "whiteness": whiteness(studied, names) if studied else {},
     }
     result["findings"] = findings(result)
     result["verdict"] = verdict(result)

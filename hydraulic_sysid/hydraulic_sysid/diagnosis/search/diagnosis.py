@@ -14,7 +14,7 @@ from hydraulic_sim.model import Model
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.check import contradictions
 from hydraulic_sysid.diagnosis.check import rows as check_rows
-from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures, locate
+from hydraulic_sysid.diagnosis.locate import LocateError, balance_figures
 from hydraulic_sysid.estimation.fit import FitSettings
 
 from . import verdict as verdicts
@@ -28,10 +28,12 @@ from .progress import Watch
 from .search import Search
 from .search_state import SearchResult
 from .uncertainty import Known
+from .unknown_inputs import unknown_inputs
+from .whereabouts import Whereabouts
 
-BALANCED = 40.0  # s of all records together of which balances are formed where they are not attributed, …
+BALANCED = 40.0  # s of all records together of which balances are formed, …
 SHORT = 4.0  # … and at least of each
-BALANCED_SAMPLES = 100_000  # of all records together, whatever is done: this bounds the memory
+BALANCED_SAMPLES = 100_000  # of all records together: this bounds the memory
 SAMPLED = 60  # segments that are kept of what is left
 HASTE = "A quick look: what is small may be missed."
 
@@ -110,19 +112,18 @@ def diagnose(
         # Where most is left, what was added is a proxy for something else, and bends curves and balances.
         proxy = explained(found.base.misfit, found.final.misfit) < CRITERIA.hopeless
         suspect = found.base if proxy else found.final
-        curves: list[NonparametricCurve] = []
-        much = found.final.misfit.usual > CRITERIA.right_law and not (found.by_force or found.stopped)
-        if outside or (found.added and much):
+        where, much = Whereabouts(), found.final.misfit.usual > CRITERIA.right_law
+        if outside or (found.added and much and not (found.by_force or found.stopped)):
             curves = search.curves(suspect, say)
             verdict = verdicts.reviewed(verdict, found, curves)
             outside = verdict.kind == verdicts.OUTSIDE
-            curves = curves if outside else []
+            where = Whereabouts.of(curves, unknown_inputs(suspect.linearisation, say)) if outside else where
         beside = () if suspect is found.base else tuple(found.added)
-        remaining = Remaining.of(suspect.linearisation, curves, beside) if outside else None
+        remaining = Remaining.of(suspect.linearisation, where.curves, beside) if outside else None
         if not outside:  # else nothing says of any model that it is right
             found = search.with_final_values(found)
         known = search.known_of(found, () if outside else found.named)
-        whole = {**document(found, verdict, known, curves, search.tested(found)), "check": check_rows(checked)}
+        whole = {**document(found, verdict, known, where, search.tested(found)), "check": check_rows(checked)}
         whole["settings"] = {**whole["settings"], "quick": quick}
         if quick:
             whole["verdict"]["text"] += f" {HASTE}"
@@ -135,17 +136,12 @@ def diagnose(
         if verdict.kind == verdicts.INDISTINGUISHABLE and tied:
             competing["+".join(tied)] = done
         before, after = found.base.model, found.final.model if found.added or found.moved else None
-        # A change along the records and a curve that shows a law say by themselves where it is.
-        shown = verdicts.drifting_effect(found) is not None or any(c.share > CRITERIA.details for c in curves)
-        asked = outside and not shown
-        suspected = None if not asked else before if proxy else after
         del found, suspect  # their sensitivities would take up the memory that the balances need
-        if quick and suspected is None:
+        if quick:
             return Diagnosis(done, competing, whole, remaining)
         say("balances")
-        rows, where = _balances(before, records, before is suspected)
-        rows_after, where_after = _balances(after, records, after is suspected) if after else ([], [])
-        return Diagnosis(done, competing, with_balances(whole, rows, rows_after, where or where_after), remaining)
+        rows, rows_after = _balances(before, records), _balances(after, records) if after else []
+        return Diagnosis(done, competing, with_balances(whole, rows, rows_after), remaining)
 
 
 def finished(found: SearchResult, known: Mapping[str, Known]) -> Model:
@@ -168,22 +164,17 @@ def finished(found: SearchResult, known: Mapping[str, Known]) -> Model:
     return done
 
 
-def _balances(
-    model: Model, records: Sequence[Record], attribute: bool
-) -> tuple[Sequence[Mapping[str, Any]], Sequence[str]]:
-    """The balances' figures; and, to ``attribute`` them, subsystems by what each explains of them, most first."""
+def _balances(model: Model, records: Sequence[Record]) -> Sequence[Mapping[str, Any]]:
+    """The balances' figures."""
     try:
-        if not attribute:
-            return balance_figures(model, shortened(records, BALANCED)), []
-        found = locate(model, shortened(records, math.inf), maps=False)
+        return balance_figures(model, shortened(records))
     except (LocateError, SimulationError):
-        return [], []
-    return found["balances"], [str(s["name"]) for s in found["attribution"]]
+        return []
 
 
-def shortened(records: Sequence[Record], seconds: float) -> list[Record]:
-    """The middle of every record: ``seconds`` and `BALANCED_SAMPLES` of all together."""
-    share = min(seconds / sum(r.duration for r in records), BALANCED_SAMPLES / sum(map(len, records)))
+def shortened(records: Sequence[Record]) -> list[Record]:
+    """The middle of every record: `BALANCED` seconds and `BALANCED_SAMPLES` of all together."""
+    share = min(BALANCED / sum(r.duration for r in records), BALANCED_SAMPLES / sum(map(len, records)))
     found = []
     for r in records:
         least = min(SHORT, BALANCED_SAMPLES * r.dt / len(records))

@@ -23,6 +23,7 @@ from .search_state import SearchResult
 from .uncertainty import Known
 from .unseen import TriedOut
 from .verdict import MISSING, OUTSIDE, UNDECIDED, Verdict
+from .whereabouts import Whereabouts
 from .worst_segments import worst_segments
 
 _NEAREST = 3
@@ -33,7 +34,7 @@ def document(
     result: SearchResult,
     verdict: Verdict,
     known: Mapping[str, Known],
-    curves: Sequence[NonparametricCurve],
+    where: Whereabouts,
     tested: TriedOut | None = None,
 ) -> dict[str, Any]:
     """The document, still without balances (`with_balances`); arrays NumPy, SI. ``tested``: on test data, if at all."""
@@ -44,7 +45,7 @@ def document(
     outside = verdict.kind == OUTSIDE
     explained = final.misfit.variance <= 1.0 + 2.0 * CRITERIA.noise_missed
     compared = posterior.explanations(result, verdict)
-    said = [verdicts.sentences(result, verdict, curves), "" if tested is None else tested.text]
+    said = [verdicts.sentences(result, verdict, where), "" if tested is None else tested.text]
     text = " ".join(filter(None, [*said, posterior.sentence(compared)]))
     return {
         **heading("diagnose", 2),
@@ -77,7 +78,7 @@ def document(
             "kind": verdict.kind,
             "level": "off" if outside else "explained" if explained and verdict.kind != UNDECIDED else "close",
             "effects": verdict.possible,
-            "subsystem": verdicts.place(result, verdict, curves),
+            "subsystem": verdicts.place(result, verdict, where),
             "probability": posterior.probability(compared),
             "text": text + verdicts.warning(verdict.possible, imitations),
             "imitated": imitations,
@@ -133,7 +134,8 @@ def document(
         "drift": None if result.drift is None else vars(result.drift),
         "parameters": _parameters(final.model, known, final.linearisation.parameters.keys),
         "unexplained_share": result.unexplained_share,
-        "nonparametric_curves": [_curve(c) for c in curves],
+        "nonparametric_curves": [_curve(c) for c in where.curves],
+        "unknown_inputs": [vars(u) for u in where.inputs],
         "nearest_effects": [r.name for r in final.refits[:_NEAREST]] if outside else [],
         "proposed_effect": None,
         "balances": [],
@@ -163,7 +165,7 @@ def added_document(
 ) -> dict[str, Any]:
     """The document of one effect added on request: the same keys, as far as they apply."""
     (name,) = result.added
-    whole = document(result, Verdict(MISSING, [name], {}, {}), known, (), tested)
+    whole = document(result, Verdict(MISSING, [name], {}, {}), known, Whereabouts(), tested)
     before, after = (number["validation"] for number in (whole["residual"]["before"], whole["residual"]["after"]))
     text = f"With {name} the residual on validation data goes from {before:.4g} to {after:.4g} × noise"
     whole |= heading("add", 2)
@@ -176,8 +178,8 @@ def added_document(
         ]),
     }
     del whole["verdict"]["probability"]
-    unused = ("explanations", "competing_models", "nonparametric_curves", "nearest_effects", "proposed_effect",
-              "balances")  # fmt: skip
+    unused = ("explanations", "competing_models", "nonparametric_curves", "unknown_inputs", "nearest_effects",
+              "proposed_effect", "balances")  # fmt: skip
     return {k: v for k, v in whole.items() if k not in unused}
 
 
@@ -185,18 +187,12 @@ def with_balances(
     whole: dict[str, Any],
     before: Sequence[Mapping[str, Any]],
     after: Sequence[Mapping[str, Any]],
-    suspected: Sequence[str],
 ) -> dict[str, Any]:
-    """The document with balances.
-
-    :param suspected: subsystems by what they explain of them, the most first, where that says where something
-        outside the library is
-    """
+    """The document with balances."""
     later = {b["name"]: b["ratio"] for b in after}
     keys = ("name", "subsystem", "unit", "residual_rms", "exact_rms", "ratio")
     rows = [{**{k: b[k] for k in keys if k in b}, "ratio_after": later.get(b["name"])} for b in before]
-    where = suspected[0] if suspected else whole["verdict"]["subsystem"]
-    return {**whole, "balances": rows, "verdict": {**whole["verdict"], "subsystem": where}}
+    return {**whole, "balances": rows}
 
 
 def _residual(misfit: Misfit) -> dict[str, float]:

@@ -27,6 +27,7 @@ from .remainder import Remainder, Spikes, immaterial
 from .search_state import SearchResult, Together
 from .set_aside import DIFFERENT, FAR_OFF, SATURATED, SetAside
 from .unknown_law import probability_of_unknown
+from .whereabouts import Whereabouts, nowhere
 from .whiteness import Whiteness
 
 MISSING = "missing"
@@ -41,7 +42,6 @@ DECIDED = (MISSING, COMPLETE, DATA_SHEET, RECORDING)
 
 NO_EFFECT = "No effect of the library is missing."
 UNCERTAIN = "No effect of the library is missing, as far as can be said before that is mended."
-READING = "sensor"  # subsystem of the reading of the position
 IN_LINE = ("valve", "sensor")  # subsystems that a signal passes on its way from the command to what is read
 
 
@@ -223,32 +223,14 @@ def strained(result: SearchResult) -> bool:
     return any(side == "highest" or lowest[key] != 0.0 for key, side in shapes.at_bound.items())
 
 
-def place(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str | None:
-    """The subsystem of the first effect added, or of the curve that explains most of what no effect does."""
+def place(result: SearchResult, verdict: Verdict, left: Whereabouts) -> str | None:
+    """The subsystem of the first effect added, or that where what no effect explains comes from."""
     if verdict.kind == OUTSIDE:
         drifting = drifting_effect(result)
-        if drifting is not None and elsewhere(result, curves) is None:
+        if drifting is not None and elsewhere(result, left.curves) is None:
             return subsystem(result.model.library[drifting])
-        return READING if nowhere(curves) else curves[0].subsystem if curves else None
+        return left.subsystem
     return subsystem(result.model.library[result.added[0]]) if result.added else None
-
-
-def nowhere(curves: Sequence[NonparametricCurve]) -> bool:
-    """Whether no curve explains any part of what is left.
-
-    What acts in a plant reaches the position through its mass and its oil, so that some slow curve takes up a part of
-    it; what spoils the reading of the position itself need not be a function of anything.
-    """
-    return bool(curves) and all(c.share <= CRITERIA.details for c in curves)
-
-
-def as_likely(curves: Sequence[NonparametricCurve], best: NonparametricCurve) -> list[NonparametricCurve]:
-    """The best curve of each other subsystem that explains nearly as much as the ``best`` one."""
-    found: dict[str, NonparametricCurve] = {}
-    for c in curves:
-        if c.subsystem != best.subsystem and c.share > CRITERIA.nearly * best.share:
-            found.setdefault(c.subsystem, c)
-    return list(found.values())
 
 
 def elsewhere(result: SearchResult, curves: Sequence[NonparametricCurve]) -> NonparametricCurve | None:
@@ -264,7 +246,7 @@ def elsewhere(result: SearchResult, curves: Sequence[NonparametricCurve]) -> Non
     return None if any(c.subsystem == own and c.share > least for c in curves) else best
 
 
-def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[NonparametricCurve]) -> str:
+def sentences(result: SearchResult, verdict: Verdict, where: Whereabouts) -> str:
     """What a user reads first."""
     base, final = result.before_over_noise.rms_validation, result.final.misfit.rms_validation
     left = " ".join([remainder_sentence(result.remainders), *noise_sentences(result)])
@@ -313,17 +295,8 @@ def sentences(result: SearchResult, verdict: Verdict, curves: Sequence[Nonparame
         text += f"The nearest is {_and(result.added)}. {fell} "
     else:
         text += f"On validation data the residual is {final:.3g} × noise. "
-    best = curves[0] if curves and drift is None else elsewhere(result, curves)
-    if nowhere(curves):
-        text += (
-            f"No curve at any place of the plant would explain {100 * CRITERIA.details:.0f} % of it: "
-            "it may be in how the motion is read."
-        )
-    elif best is not None:
-        more = "" if drift is None else " more"
-        text += f"It looks{more} like {_curve(best)}, which would explain {100 * best.share:.0f} % of it"
-        others = [f"{_curve(c)} ({100 * c.share:.0f} %)" for c in as_likely(curves, best)]
-        text += f"; nearly as much: {_and(others)}." if others else "."
+    best = where.curves[0] if where.curves and drift is None else elsewhere(result, where.curves)
+    text += where.sentence(best, "" if drift is None else " more")
     # Not what the numbers of the data sheet were bent to: they imitate what no effect explains.
     return " ".join([text.strip(), *recording_sentences(result), *aside])
 
@@ -351,10 +324,6 @@ def drift_sentences(result: SearchResult) -> list[str]:
     if result.drift is None or drive_unknown(result) or decisive_drift(result) is not None:
         return []
     return [f"Besides, {_changes(result, result.drift)}."]
-
-
-def _curve(found: NonparametricCurve) -> str:
-    return f"{found.summary} over {found.variable.replace('_', ' ')}"
 
 
 def _changes(result: SearchResult, d: Drift) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 from hydraulic_sim.effect import Effect, Parameter
 
 _SOURCE = "curve of a residual"
+_NEVER = 1e12  # s
 
 
 def effect(
@@ -22,11 +23,15 @@ def effect(
 ) -> Effect:
     """An effect whose kernel takes over, centre, width and height of a hat function.
 
-    Summary and equation are the first two paragraphs of the file's docstring; ``size``, which is tried, and ``most``,
-    its bound, are in ``unit``; ``shape``: parameters besides; ``passive``: it may not be negative, since that would
-    feed itself, as a leak that flows uphill; ``more``: fields of the effect.
+    One over the time takes the period after which it begins again, too (by default never). Summary and equation are the
+    first two paragraphs of the file's docstring; ``size``, which is tried, and ``most``, its bound, are in ``unit``;
+    ``shape``: parameters besides; ``passive``: it may not be negative, since that would feed itself, as a leak that
+    flows uphill; ``more``: fields of the effect.
     """
     least = 0.0 if passive else -most
+    if "period" in inspect.signature(kernel).parameters:
+        again = "time after which the time begins again"
+        shape = (*shape, Parameter("period", "s", _NEVER, (1e-12, _NEVER), again, _SOURCE, free=False))
     summary, equation, *_ = inspect.cleandoc(kernel.__globals__["__doc__"]).split("\n\n")
     return Effect(
         slot=slot,

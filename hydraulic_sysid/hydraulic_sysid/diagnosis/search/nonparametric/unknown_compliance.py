@@ -9,8 +9,8 @@ VARIABLES = ("mean_pressure", "position", "time")
 RETURNS = "law, law"
 
 
-def add(pressure_a, pressure_b, position, t, over, centre, width, height):
-    z = (0.5 * (pressure_a + pressure_b), position, t)[int(over)]
+def add(pressure_a, pressure_b, position, t, over, centre, width, height, period):
+    z = (0.5 * (pressure_a + pressure_b), position, t % period)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     c = height * hat if hat > 0.0 else 0.0
     return c, c

@@ -9,8 +9,8 @@ VARIABLES = ("position", "time", "speed", "size_of_pressure_difference")
 RETURNS = "-law * pressure_difference, law * pressure_difference"
 
 
-def add(position, t, velocity, pressure_difference, over, centre, width, height):
-    z = (position, t, abs(velocity), abs(pressure_difference))[int(over)]
+def add(position, t, velocity, pressure_difference, over, centre, width, height, period):
+    z = (position, t % period, abs(velocity), abs(pressure_difference))[int(over)]
     hat = 1.0 - abs(z - centre) / width
     q = height * hat * pressure_difference if hat > 0.0 else 0.0
     return -q, q

@@ -9,8 +9,11 @@ VARIABLES = ("velocity", "position", "pressure_difference", "mean_pressure", "op
 RETURNS = "-law"
 
 
-def add(velocity, position, pressure_difference, pressure_a, pressure_b, opening, t, over, centre, width, height):
-    z = (velocity, position, pressure_difference, 0.5 * (pressure_a + pressure_b), opening, t)[int(over)]
+def add(
+    velocity, position, pressure_difference, pressure_a, pressure_b, opening, t,
+    over, centre, width, height, period,
+):
+    z = (velocity, position, pressure_difference, 0.5 * (pressure_a + pressure_b), opening, t % period)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     return -height * hat if hat > 0.0 else 0.0
 

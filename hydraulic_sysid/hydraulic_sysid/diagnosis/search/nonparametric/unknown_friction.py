@@ -11,8 +11,11 @@ VARIABLES = ("position", "speed", "size_of_pressure_difference", "mean_pressure"
 RETURNS = "-law * direction"
 
 
-def add(position, velocity, pressure_difference, pressure_a, pressure_b, t, direction, over, centre, width, height):
-    z = (position, abs(velocity), abs(pressure_difference), 0.5 * (pressure_a + pressure_b), t)[int(over)]
+def add(
+    position, velocity, pressure_difference, pressure_a, pressure_b, t, direction,
+    over, centre, width, height, period,
+):
+    z = (position, abs(velocity), abs(pressure_difference), 0.5 * (pressure_a + pressure_b), t % period)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     return -height * hat * direction if hat > 0.0 else 0.0
 

@@ -9,8 +9,8 @@ VARIABLES = ("position", "time", "pressure_difference", "velocity")
 RETURNS = "opening * (1.0 + law)"
 
 
-def add(position, t, pressure_difference, velocity, opening, over, centre, width, height):
-    z = (position, t, pressure_difference, velocity)[int(over)]
+def add(position, t, pressure_difference, velocity, opening, over, centre, width, height, period):
+    z = (position, t % period, pressure_difference, velocity)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     return opening * (1.0 + height * hat) if hat > 0.0 else opening
 

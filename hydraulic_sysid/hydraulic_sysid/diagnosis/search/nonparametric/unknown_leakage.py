@@ -9,8 +9,8 @@ VARIABLES = ("pressure_difference", "position", "velocity", "opening", "time")
 RETURNS = "-law, law"
 
 
-def add(pressure_difference, position, velocity, opening, t, over, centre, width, height):
-    z = (pressure_difference, position, velocity, opening, t)[int(over)]
+def add(pressure_difference, position, velocity, opening, t, over, centre, width, height, period):
+    z = (pressure_difference, position, velocity, opening, t % period)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     q = height * hat if hat > 0.0 else 0.0
     return -q, q

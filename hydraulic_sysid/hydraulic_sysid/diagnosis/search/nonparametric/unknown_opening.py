@@ -9,8 +9,8 @@ VARIABLES = ("opening", "velocity", "pressure_difference", "position", "time")
 RETURNS = "opening + law"
 
 
-def add(opening, velocity, pressure_difference, position, t, over, centre, width, height):
-    z = (opening, velocity, pressure_difference, position, t)[int(over)]
+def add(opening, velocity, pressure_difference, position, t, over, centre, width, height, period):
+    z = (opening, velocity, pressure_difference, position, t % period)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     return opening + height * hat if hat > 0.0 else opening
 

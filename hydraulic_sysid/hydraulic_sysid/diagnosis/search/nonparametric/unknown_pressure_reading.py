@@ -16,8 +16,8 @@ RETURNS = {
 EXPRESSIONS = {"pressure_a": "reading_a", "pressure_b": "reading_b"}
 
 
-def add(reading_a, reading_b, t, over, centre, width, height):
-    z = (reading_a, reading_b, t)[int(over)]
+def add(reading_a, reading_b, t, over, centre, width, height, period):
+    z = (reading_a, reading_b, t % period)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     error = height * hat if hat > 0.0 else 0.0
     a = error if over != 1.0 else 0.0

@@ -9,8 +9,8 @@ VARIABLES = ("position", "velocity", "time", "pressure_difference")
 RETURNS = "reading + law"
 
 
-def add(position, velocity, t, pressure_difference, reading, over, centre, width, height):
-    z = (position, velocity, t, pressure_difference)[int(over)]
+def add(position, velocity, t, pressure_difference, reading, over, centre, width, height, period):
+    z = (position, velocity, t % period, pressure_difference)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     return reading + height * hat if hat > 0.0 else reading
 

@@ -9,8 +9,8 @@ VARIABLES = ("size_of_opening", "velocity", "time", "pressure_difference")
 RETURNS = "law"
 
 
-def add(opening, velocity, t, pressure_difference, over, centre, width, height):
-    z = (abs(opening), velocity, t, pressure_difference)[int(over)]
+def add(opening, velocity, t, pressure_difference, over, centre, width, height, period):
+    z = (abs(opening), velocity, t % period, pressure_difference)[int(over)]
     hat = 1.0 - abs(z - centre) / width
     return height * hat if hat > 0.0 else 0.0
 

@@ -1,0 +1,99 @@
+"""Where something unknown acts: how much an addition of any course in time would explain at each place of the plant.
+
+No law is assumed, so that none can be wrong: at one place after the other the model gets an input that may do anything,
+and what that explains bounds what any law there may. A disturbance enters the measured channels with the dynamics of
+its place (unknown inputs: Gillijns & De Moor, Automatica 43 (2007) 111-116), which is why several channels tell one
+place from another. In each segment the course is a curve of its own, of linear B-splines over the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydraulic_sim.arrays import Array
+from hydraulic_sim.errors import SimulationError
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
+
+from .candidates import subsystem
+from .criteria import CRITERIA
+from .linearisation import Linearisation
+from .nonparametric_curves import Place, places, unexplained
+
+KNOTS = (6, 12, 24)  # in the length of a segment, the more where fewer explain `CRITERIA.nearly` all nowhere
+_FAINT = 1e-6  # of the largest change that a course makes in a segment: one that changes less is none
+
+
+@dataclass(frozen=True)
+class UnknownInput:
+    """An addition of any course at a ``place``; ``share`` (0…1) of what noise does not explain that it would."""
+
+    place: str
+    subsystem: str
+    summary: str
+    share: float
+
+
+def unknown_inputs(at: Linearisation, say: Callable[[str], None]) -> list[UnknownInput]:
+    """At every place of the plant, the one that would explain most first."""
+    part, _ = at.sample(CRITERIA.enough_to_score)
+    over_time = [place for place in places(part, say) if place.variable == "time"]
+    found = list[UnknownInput]()
+    for knots in KNOTS:
+        if found and found[0].share > CRITERIA.nearly:
+            break
+        shares = [_share(part, place, knots) for place in over_time]
+        found = [
+            UnknownInput(p.effect.name, subsystem(p.effect), p.effect.summary, share)
+            for p, share in zip(over_time, shares, strict=True)
+        ]
+        found.sort(key=lambda u: -u.share)
+    return found
+
+
+def _share(at: Linearisation, place: Place, knots: int) -> float:
+    """0 where the plant does not run with it."""
+    name, length = place.effect.name, max(s.samples * s.record.dt for s in at.split.segments)
+    width = length / knots
+    # It begins again after more than a segment, which so sees every hat once.
+    courses = {"over": float(place.number), "width": width, "period": length + 2.0 * width, "centre": 0.0}
+    hats = [courses | {"centre": k * width, "height": place.height.default} for k in range(knots + 3)]
+    plants = [
+        place.plant.with_parameters({f"{name}.{k}": v for k, v in hat.items()})
+        for hat in (courses | {"height": 0.0}, *hats)
+    ]
+    try:
+        changed = at.changes(plants)
+    except SimulationError:
+        return 0.0
+    own = at.point.beyond([c[..., 1:] - c[..., :1] for c in changed])
+    down, up = at.parameters.reach
+    information = np.diag(at.parameters.prior_information + 12.0 / (up - down) ** 2)
+    scores, left, freedom = list[Array](), 0.0, 0
+    for columns, residual, courses_here in zip(at.beyond, at.residual, own, strict=True):
+        basis = _basis(courses_here)
+        freedom += int(np.count_nonzero(basis.any(axis=1)))
+        rest = _without(basis, residual[..., None])
+        beyond = _without(basis, columns)
+        information += np.tensordot(beyond, beyond, axes=([0, 1], [0, 1]))
+        scores.append(np.einsum("smp,sm->sp", beyond, rest[..., 0]))
+        left += float(np.sum(rest**2))
+    normal = NormalEquations(information, tuple(scores), at.parameters.prior_gradient)
+    change = -np.linalg.pinv(normal.information, rcond=1e-12, hermitian=True) @ normal.gradient
+    total = sum(float(c.sum()) for c in at.costs)
+    explained = total - (left - normal.reduction(change)) - freedom
+    return min(max(explained / max(unexplained(at), 1e-300), 0.0), 1.0)
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal directions (S, m, K) of columns (S, m, K), 0 in the place of those that hardly are any."""
+    directions, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    most = sizes.max(axis=1, keepdims=True)
+    return np.where((sizes > _FAINT * most) & (sizes > 0.0), 1.0, 0.0)[:, None, :] * directions
+
+
+def _without(basis: Array, columns: Array) -> Array:
+    """Columns (S, m, Q) beyond a basis (S, m, K)."""
+    return columns - basis @ (np.swapaxes(basis, 1, 2) @ columns)

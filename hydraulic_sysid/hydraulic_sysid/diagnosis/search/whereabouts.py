@@ -1,0 +1,101 @@
+"""Where what no effect explains comes from: curves over a variable, bounded by what an addition of any course would."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .criteria import CRITERIA
+from .nonparametric_curves import NonparametricCurve
+from .unknown_inputs import UnknownInput
+
+READING = "sensor"  # subsystem of the reading of the position
+
+
+def nowhere(curves: Sequence[NonparametricCurve]) -> bool:
+    """Whether no curve explains any part of what is left."""
+    return bool(curves) and all(c.share <= CRITERIA.details for c in curves)
+
+
+@dataclass(frozen=True)
+class Whereabouts:
+    """``curves`` and unknown ``inputs``, each the best first; of plants that take none of the latter those are empty.
+
+    A curve is the best where no other explains more at a place at which something may explain nearly the most; of those
+    that explain nearly as much it is that at whose place more may be explained.
+    """
+
+    curves: Sequence[NonparametricCurve] = ()
+    inputs: Sequence[UnknownInput] = ()
+
+    @classmethod
+    def of(cls, curves: Sequence[NonparametricCurve], inputs: Sequence[UnknownInput]) -> Whereabouts:
+        """With the curves in order, which come as they explain."""
+        bare = cls(curves, inputs)
+        possible = [c for c in curves if bare.possible(c)]
+        if not possible:
+            return bare
+        near = [c for c in possible if c.share >= CRITERIA.nearly * possible[0].share]
+        best = max(near, key=lambda c: bare.bound(c.place))
+        return cls(sorted(curves, key=lambda c: (c is not best, not bare.possible(c))), inputs)
+
+    def bound(self, place: str) -> float:
+        """The share that anything at a place may explain."""
+        return next((u.share for u in self.inputs if u.place == place), 1.0)
+
+    def possible(self, curve: NonparametricCurve) -> bool:
+        """Whether what may be explained at its place is nearly the most."""
+        return not self.inputs or self.bound(curve.place) >= CRITERIA.nearly * self.inputs[0].share
+
+    @property
+    def clear(self) -> bool:
+        """Whether an addition of any course explains the most of it somewhere."""
+        return bool(self.inputs) and self.inputs[0].share > CRITERIA.most_of
+
+    @property
+    def subsystem(self) -> str | None:
+        """Where it comes from; None if nothing is known of it.
+
+        What acts in a plant reaches the position through its mass and its oil, so that a slow course takes up a part of
+        it: what neither that nor a curve explains is in how the position is read.
+        """
+        if nowhere(self.curves):
+            return self.inputs[0].subsystem if self.clear else READING
+        return self.curves[0].subsystem if self.curves else None
+
+    def as_likely(self, best: NonparametricCurve) -> list[NonparametricCurve]:
+        """The best curve of each other subsystem that explains nearly as much as the ``best`` one."""
+        found: dict[str, NonparametricCurve] = {}
+        for c in self.curves:
+            if c.subsystem != best.subsystem and self.possible(c) and c.share > CRITERIA.nearly * best.share:
+                found.setdefault(c.subsystem, c)
+        return list(found.values())
+
+    def sentence(self, best: NonparametricCurve | None, more: str = "") -> str:
+        """What a user reads of it; of the ``best`` curve, where there is one.
+
+        :param more: " more", where something else was said before
+        """
+        if nowhere(self.curves):
+            none = f"No curve at any place of the plant would explain {100 * CRITERIA.details:.0f} % of it"
+            if not self.clear:
+                return f"{none}: it may be in how the motion is read."
+            first, *rest = self.inputs
+            near = [u for u in rest if u.subsystem != first.subsystem and u.share > CRITERIA.nearly * first.share]
+            others = [f"{_course(u)} {100 * u.share:.0f} %" for u in near]
+            also = f" ({', '.join(others)})" if others else ""
+            return f"{none}; {_course(first)}, of any course in time, would explain {100 * first.share:.0f} %{also}."
+        if best is None:
+            return ""
+        course = f" (of any course in time {100 * self.bound(best.place):.0f} %)" if self.inputs else ""
+        said = f"It looks{more} like {_curve(best)}, which would explain {100 * best.share:.0f} % of it{course}"
+        others = [f"{_curve(c)} ({100 * c.share:.0f} %)" for c in self.as_likely(best)]
+        return f"{said}; nearly as much: {' and '.join(others)}." if others else f"{said}."
+
+
+def _curve(found: NonparametricCurve) -> str:
+    return f"{found.summary} over {found.variable.replace('_', ' ')}"
+
+
+def _course(found: UnknownInput) -> str:
+    return found.summary.removesuffix(" of any shape")
