@@ -36,6 +36,7 @@ from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import CandidateRefit, SearchResult, SearchState, Together
 from hydraulic_sysid.diagnosis.search.spectral_lines import spectral_lines
 from hydraulic_sysid.diagnosis.search.uncertainty import Known, parameter_errors
+from hydraulic_sysid.diagnosis.search.whereabouts import Whereabouts
 from hydraulic_sysid.diagnosis.search.worth import (
     absorbs_discrepancy,
     decisive,
@@ -336,9 +337,9 @@ def test_a_curve_that_explains_nothing_is_not_what_it_looks_like(model, share: f
     found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
     curve = SimpleNamespace(summary="a leak", variable="time", share=share, subsystem="flow")
     outside = verdict.Verdict(verdict.OUTSIDE, [], {}, {})
-    assert said in verdict.sentences(found, outside, [curve])
+    assert said in verdict.sentences(found, outside, Whereabouts([curve]))
     where = "flow" if share > 0.3 else "sensor"  # what acts in a plant is smoothed on its way to the position
-    assert verdict.place(found, outside, [curve]) == where
+    assert verdict.place(found, outside, Whereabouts([curve])) == where
 
 
 @pytest.mark.parametrize(
@@ -349,7 +350,7 @@ def test_other_places_that_explain_nearly_as_much_are_named(model, share: float,
     found = SearchResult(model, Split([], []), FitSettings(), base, base, {}, {})
     flow = [SimpleNamespace(summary="a leak", variable=v, share=0.34, subsystem="flow") for v in ("time", "speed")]
     valve = SimpleNamespace(summary="a valve", variable="opening", share=share, subsystem="valve")
-    text = verdict.sentences(found, verdict.Verdict(verdict.OUTSIDE, [], {}, {}), [*flow, valve]) + " "
+    text = verdict.sentences(found, verdict.Verdict(verdict.OUTSIDE, [], {}, {}), Whereabouts([*flow, valve])) + " "
     assert f"a leak over time, which would explain 34 % of it{said if said[0] == ';' else '. '}" in text
 
 
@@ -358,7 +359,7 @@ def test_what_rises_is_not_said_to_fall(model, after: float, said: str) -> None:
     base, final = state(model, 30000.0, {}), state(model.with_effect("constant_load"), after, {})
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     judged = verdict.Verdict(verdict.OUTSIDE, ["constant_load"], {}, {})
-    assert said in verdict.sentences(found, judged, [])
+    assert said in verdict.sentences(found, judged, Whereabouts())
 
 
 @pytest.mark.parametrize(
@@ -413,10 +414,10 @@ def test_beside_an_effect_a_change_that_is_small_or_explains_little_is_a_detail(
         drift=Drift("coulomb_friction.level", 450.0, 450.0 * share, 2.0, share, explained),
     )  # fmt: skip
     judged = verdict.judge(found)
-    said = verdict.sentences(found, judged, [])
+    said = verdict.sentences(found, judged, Whereabouts())
     assert said.startswith(begins)
     assert said.count("coulomb_friction.level changes along the records") == 1
-    assert verdict.place(found, judged, []) == (None if explained == 500.0 else "force")
+    assert verdict.place(found, judged, Whereabouts()) == (None if explained == 500.0 else "force")
 
 
 @pytest.mark.parametrize(
@@ -436,9 +437,9 @@ def test_what_drifts_is_where_a_curve_explains_it_better(model, best: float, own
         SimpleNamespace(summary="dry friction", subsystem="force", variable="time", share=own),
     ]
     judged = verdict.judge(found)
-    assert judged.kind == verdict.OUTSIDE and verdict.place(found, judged, curves) == place
+    assert judged.kind == verdict.OUTSIDE and verdict.place(found, judged, Whereabouts(curves)) == place
     looks = "It looks more like an error of the position sensor over time, which would explain 98 % of it."
-    assert (looks in verdict.sentences(found, judged, curves)) == (place == "sensor")
+    assert (looks in verdict.sentences(found, judged, Whereabouts(curves))) == (place == "sensor")
 
 
 @pytest.mark.parametrize(
@@ -689,9 +690,10 @@ def test_a_small_remainder_does_not_take_back_what_is_said_of_the_recording(mode
     assert verdict.kind_of(found, tied=False) == verdict.RECORDING
     much = replace(found, as_recorded=as_recorded(model, 3000 * 1.5))
     assert verdict.kind_of(much, tied=False) == verdict.OUTSIDE
-    assert late.text in verdict.sentences(much, verdict.judge(much), []), "it is said all the same"
+    assert late.text in verdict.sentences(much, verdict.judge(much), Whereabouts()), "it is said all the same"
     much = replace(much, moved=(Deviation("dead_volume_a", 200e-6, 205e-6, 2.1e-6, 2000.0),))
-    assert "dead_volume_a" not in verdict.sentences(much, verdict.judge(much), []), "bent to what is not known"
+    said = verdict.sentences(much, verdict.judge(much), Whereabouts())
+    assert "dead_volume_a" not in said, "bent to what is not known"
 
 
 def test_a_fault_of_the_recording_that_explains_the_same_is_named_beside_the_effect(model) -> None:
@@ -703,7 +705,7 @@ def test_a_fault_of_the_recording_that_explains_the_same_is_named_beside_the_eff
     found = replace(found, faults_instead=[fault])
     judged = verdict.judge(found)
     assert judged.kind == verdict.INDISTINGUISHABLE and judged.possible == ["pressure_offset"]
-    said = verdict.sentences(found, judged, [])
+    said = verdict.sentences(found, judged, Whereabouts())
     assert said.startswith("Missing: pressure_offset, or nothing is, and pressure_a reads 5.0 % too much. These data")
 
 
@@ -787,7 +789,7 @@ def test_a_fault_and_a_number_that_explain_the_same_together_are_named_beside_th
     )
     judged = verdict.judge(found)
     assert judged.kind == verdict.INDISTINGUISHABLE and judged.possible == ["pressure_offset"]
-    said = verdict.sentences(found, judged, [])
+    said = verdict.sentences(found, judged, Whereabouts())
     assert said.startswith(
         "Missing: pressure_offset, or nothing is, and pressure_a reads 5.0 % too much and supply_pressure is 141"
     )

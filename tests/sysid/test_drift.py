@@ -15,6 +15,7 @@ from hydraulic_sysid.diagnosis.search import document, verdict
 from hydraulic_sysid.diagnosis.search.drift import LEAST, Drift, steady
 from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.search_state import SearchResult
+from hydraulic_sysid.diagnosis.search.whereabouts import Whereabouts
 from hydraulic_sysid.estimation.fit import FitSettings
 
 DT, SECONDS, PIECE = 1e-3, 16.0, 200
@@ -59,10 +60,10 @@ def test_a_parameter_that_changes_along_the_records_is_named(model: Model, chang
     assert found.change == pytest.approx(change, rel=0.1)
     assert found.value == pytest.approx(0.02, rel=0.05) and found.share == pytest.approx(change / 0.02, rel=0.1)
     judged = verdict.judge(result)
-    assert judged.kind == verdict.OUTSIDE and verdict.place(result, judged, []) == "valve"
-    said = verdict.sentences(result, judged, [])
+    assert judged.kind == verdict.OUTSIDE and verdict.place(result, judged, Whereabouts()) == "valve"
+    said = verdict.sentences(result, judged, Whereabouts())
     assert said.startswith(f"Outside the library: {KEY} changes along the records, by ") and "as no effect does" in said
-    whole = document.document(result, judged, {}, [])
+    whole = document.document(result, judged, {}, Whereabouts())
     assert whole["drift"]["key"] == KEY and whole["verdict"]["level"] == "off", "however little it leaves"
 
 

@@ -88,7 +88,7 @@ THOROUGH = ("stribeck_friction", "command_delay", "sensor_lag")  # another one o
 def test_subsystem_of_a_missing_effect_is_found(model: Model, effect: str) -> None:
     subsystem, values = FAULTS[effect]
     plant = model.with_effect(effect, values)
-    result = locate(model, [record_of(plant, seed, seconds=5.0) for seed in (2, 3)], maps=False)
+    result = locate(model, [record_of(plant, seed, seconds=5.0) for seed in (2, 3)])
     assert result["verdict"]["level"] != "explained"
     assert first(result)["name"] == subsystem, [(s["name"], s["alone"]) for s in result["attribution"]]
     assert first(result)["share"] > 0.5
@@ -97,7 +97,7 @@ def test_subsystem_of_a_missing_effect_is_found(model: Model, effect: str) -> No
 def test_wrong_free_parameter_is_no_fault_of_a_subsystem(model: Model) -> None:
     """The mass is off by a tenth: the force balance shows it, and no subsystem is blamed for it."""
     plant = model.with_values({"moving_mass": 550.0, "viscous_friction.coefficient": 180.0})
-    result = locate(model, [record_of(plant, 4), record_of(plant, 5)], maps=False)
+    result = locate(model, [record_of(plant, 4), record_of(plant, 5)])
     assert result["misfit"]["model"] > 1.2 * result["misfit"]["refitted"]
     assert result["verdict"]["level"] == "explained"
 
@@ -105,7 +105,7 @@ def test_wrong_free_parameter_is_no_fault_of_a_subsystem(model: Model) -> None:
 def test_parameter_stays_within_its_bounds(model: Model) -> None:
     """A leakage ten times that of the data sheet is beyond the model's bounds, and leakage is blamed."""
     plant = model.with_values({"internal_leakage.coefficient": 2e-11})
-    result = locate(model, [record_of(plant, 6), record_of(plant, 7)], maps=False)
+    result = locate(model, [record_of(plant, 6), record_of(plant, 7)])
     assert first(result)["name"] == "flow"
 
 
@@ -135,7 +135,7 @@ def test_measured_spool_and_supply_have_balances_of_their_own(model: Model) -> N
 
 def test_fewer_channels_allow_fewer_balances_and_say_so(model: Model) -> None:
     plant = model.with_effect("valve_deadband", {"width": 0.02})
-    one = locate(model, [record_of(plant, 12, ("position", "pressure_a"))], maps=False)
+    one = locate(model, [record_of(plant, 12, ("position", "pressure_a"))])
     assert [b["name"] for b in one["balances"]] == ["flow_a"]
     assert first(one)["name"] == "valve"
     missing = {m["name"]: m["why"] for m in one["not_formed"]}
@@ -159,7 +159,7 @@ def test_mechanical_axis_has_a_force_balance() -> None:
         x = Plant(physics).simulate(u, DT).position + 2e-6 * rng.standard_normal(t.size)
         return Record.sampled(f"axis{seed}", DT, {"drive": u, "position": x})
 
-    good = locate(axis, [record(axis, 1), record(axis, 2)], maps=False)
+    good = locate(axis, [record(axis, 1), record(axis, 2)])
     assert good["verdict"]["level"] == "explained"
     result = locate(axis, [record(plant, 1), record(plant, 2)])
     assert [b["name"] for b in result["balances"]] == ["force"] and result["balances"][0]["ratio"] > 3.0

@@ -74,7 +74,9 @@ def test_a_file_does_at_its_place_what_the_curve_did(file: Path, number: int, va
         written = load_effect(path).effect
         defaults = {p.name: p.default for p in written.parameters}
         centre = float(knots[middle])
-        expected = call(hat.kernel, over=float(number), centre=centre, width=step, height=height)
+        usual = {p.name: p.default for p in hat.parameters}
+        hats = {"over": float(number), "centre": centre, "width": step, "height": height}
+        expected = call(hat.kernel, **usual | hats)
         assert call(written.kernel, **defaults) == pytest.approx(expected, rel=1e-3), text
         assert (variable in UNITS) is (variable not in ("opening", "size_of_opening")), "a unit, or a pure number"
         assert {p.name: p.default for p in written.parameters if p.unit == "s"} == lag

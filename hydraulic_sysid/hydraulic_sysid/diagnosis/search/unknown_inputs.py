@@ -8,7 +8,7 @@ place from another. In each segment the course is a curve of its own, of linear 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from .criteria import CRITERIA
 from .linearisation import Linearisation
 from .nonparametric_curves import Place, places, unexplained
 
-KNOTS = (6, 12, 24)  # in the length of a segment, the more where fewer explain `CRITERIA.nearly` all nowhere
+KNOTS = (6, 12, 24)  # in the length of a segment, the more where fewer do not tell one subsystem from all others
 _FAINT = 1e-6  # of the largest change that a course makes in a segment: one that changes less is none
 
 
@@ -42,7 +42,7 @@ def unknown_inputs(at: Linearisation, say: Callable[[str], None]) -> list[Unknow
     over_time = [place for place in places(part, say) if place.variable == "time"]
     found = list[UnknownInput]()
     for knots in KNOTS:
-        if found and found[0].share > CRITERIA.nearly:
+        if found and _alone(found):
             break
         shares = [_share(part, place, knots) for place in over_time]
         found = [
@@ -51,6 +51,13 @@ def unknown_inputs(at: Linearisation, say: Callable[[str], None]) -> list[Unknow
         ]
         found.sort(key=lambda u: -u.share)
     return found
+
+
+def _alone(found: Sequence[UnknownInput]) -> bool:
+    """Whether the first explains nearly all, and what acts in other subsystems does not come near."""
+    first, *rest = found
+    others = max((u.share for u in rest if u.subsystem != first.subsystem), default=0.0)
+    return first.share > CRITERIA.nearly and others < CRITERIA.nearly * first.share
 
 
 def _share(at: Linearisation, place: Place, knots: int) -> float:

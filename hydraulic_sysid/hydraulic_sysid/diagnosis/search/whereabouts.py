@@ -49,8 +49,10 @@ class Whereabouts:
 
     @property
     def clear(self) -> bool:
-        """Whether an addition of any course explains the most of it somewhere."""
-        return bool(self.inputs) and self.inputs[0].share > CRITERIA.most_of
+        """Whether an addition of any course explains the most of it somewhere, and none to the position's reading."""
+        if not self.inputs or self.inputs[0].share < CRITERIA.most_of:
+            return False
+        return not any(u.subsystem == READING and u.share > CRITERIA.nearly * self.inputs[0].share for u in self.inputs)
 
     @property
     def subsystem(self) -> str | None:
