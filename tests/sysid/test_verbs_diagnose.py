@@ -169,7 +169,11 @@ PROPOSED_LAW = {"proposed_effect": PROPOSED["proposed_effect"] | SHOWN}
         ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
         ("undecided", {}, "Let it search to its end; The error falls"),
         ("complete", {"check": [CONTRADICTION]}, "First: The travel is too long. Mend the stroke."),
-        ("data sheet", DATA_SHEET, "Ask for the true supply_pressure or piston_area_a; 158.1; backlash, piston_area_a"),
+        (
+            "data sheet",
+            DATA_SHEET,
+            "Ask for the true supply_pressure or piston_area_a: the records cannot say; 158.1; backlash, piston_area_a",
+        ),
         ("recording", RECORDING, "The drive was late: mend it.; Look for a loose contact; Spikes in pressure"),
     ],
 )
