@@ -22,7 +22,8 @@ class Whereabouts:
     """``curves`` and unknown ``inputs``, each the best first; of plants that take none of the latter those are empty.
 
     A curve is the best where no other explains more at a place at which something may explain nearly the most; of those
-    that explain nearly as much it is that at whose place more may be explained.
+    that explain nearly as much it is that at whose place more may be explained. So it is of those that explain half as
+    much where none explains the half: then none of them is the law.
     """
 
     curves: Sequence[NonparametricCurve] = ()
@@ -35,8 +36,10 @@ class Whereabouts:
         possible = [c for c in curves if bare.possible(c)]
         if not possible:
             return bare
-        near = [c for c in possible if c.share >= CRITERIA.nearly * possible[0].share]
-        best = max(near, key=lambda c: bare.bound(c.place))
+        most = possible[0].share
+        least = (CRITERIA.nearly if most > CRITERIA.most_of else CRITERIA.most_of) * most
+        near = [c for c in possible if c.share >= least]
+        best = max(near, key=lambda c: (round(bare.bound(c.place), 2), c.share))
         return cls(sorted(curves, key=lambda c: (c is not best, not bare.possible(c))), inputs)
 
     def bound(self, place: str) -> float:
