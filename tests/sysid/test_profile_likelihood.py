@@ -19,7 +19,7 @@ from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.profile_likelihood import with_profiles
 from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.uncertainty import law_share, parameter_errors
-from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
+from hydraulic_sysid.estimation.fit import FitSettings, fit_from, fit_segments
 
 DT, NOISE = 1e-3, {"position": 2e-5, "pressure_a": 1.5e4, "pressure_b": 1.5e4}
 LEAKAGE, FREQUENCY = "internal_leakage.coefficient", "spool_dynamics.frequency"
@@ -58,6 +58,23 @@ def costs(at: Linearisation) -> Callable[[str, float], float]:
 @pytest.fixture(scope="module")
 def bench() -> Model:
     return load_model("sample_bench")
+
+
+@pytest.mark.parametrize("times", [0.7, 1.5])
+def test_a_fit_beside_a_parameter_that_is_held_begins_where_the_others_are_and_ends_where_one_from_nowhere_does(
+    bench: Model, times: float
+) -> None:
+    at = fitted(bench, FREE)
+    key, value = LEAKAGE, times * at.model.value(LEAKAGE)
+    anew = costs(at)(key, value)
+    known = at.point.of(at.split.fit)
+    begin = known.holding(key, value)
+    assert key not in begin.parameters.keys and begin.plant.value(key) == value
+    # To first order the others are there already, initial states as well.
+    assert begin.cost - known.cost < anew + 1.0
+    done = fit_from(begin, FitSettings())
+    assert done.cost - known.cost == pytest.approx(anew, abs=0.5, rel=0.05)
+    assert done.iterations <= 3
 
 
 @pytest.mark.parametrize("named", [(), (LEAKAGE,)], ids=["by sensitivities", "by fits"])

@@ -208,6 +208,38 @@ class FitPoint:
         """This point with derivatives of its own."""
         return self if self.derived is None else replace(self, derived=None)
 
+    def of(self, chosen: Sequence[Mask]) -> FitPoint:
+        """`subset`, with the derivatives that are known of this point."""
+        columns = [c[own] for c, own in zip(self.columns, chosen, strict=True) if own.any()]
+        return replace(self.subset(chosen), derived=columns)
+
+    def holding(self, key: str, value: float) -> FitPoint:
+        """A parameter held at a value, the others and the initial states where they then fit best, to first order.
+
+        The derivatives are those of this point.
+
+        :raises hydraulic_sim.errors.SimulationError: it does not run there.
+        """
+        own, information = self.parameters.keys.index(key), self.normal.information
+        others = [i for i in range(len(self.parameters)) if i != own]
+        change = np.zeros(len(self.parameters))
+        change[own] = (value - self.parameters.values[own]) / self.parameters.scales[own]
+        # Those that stay at a bound, or would go beyond, make this no worse a point to begin from.
+        towards = self.normal.gradient[others] + information[others, own] * change[own]
+        change[others] = -np.linalg.pinv(information[np.ix_(others, others)], rcond=1e-12, hermitian=True) @ towards
+        parameters = self.parameters.moved(change)
+        gone = (parameters.values - self.parameters.values) / self.parameters.scales
+        shooting = replace(self.shooting, plant=self.shooting.plant.with_parameters({key: value}))
+        ahead = [p.raw + c @ gone for p, c in zip(self.projections, self.columns, strict=True)]
+        states = shooting.corrected(self.initial_states, self.projections, ahead)
+        left = parameters.chosen(others)
+        plant = shooting.plant.with_parameters(left.by_key)
+        return replace(
+            self, shooting=shooting, parameters=left, initial_states=states,
+            projections=shooting.seen_from(self.projections, plant, states),
+            derived=[c[..., others] for c in self.columns],
+        )  # fmt: skip
+
     def with_new_directions(self, least: float) -> FitPoint:
         """This point, its directions of the initial states taken anew where they are old.
 
@@ -369,6 +401,16 @@ def fit_segments(
     starts: KnownStarts | None = None,
 ) -> Fit:
     """As `fit`, to segments that were cut before, with what is known of parameters and initial states beforehand."""
+    begin = FitPoint.begin(plant, segments, keys, settings.robust, priors, starts)
+    if not np.isfinite(begin.cost):
+        raise SimulationError(f"{plant.model.name!r} leaves all bounds from where the records show its states")
+    return fit_from(begin, settings, progress)
+
+
+def fit_from(
+    begin: FitPoint, settings: FitSettings, progress: Callable[[int, float], object] | None = None
+) -> Fit:
+    """As `fit`, from a point on that is known."""
 
     def accepted(number: int, point: FitPoint) -> FitPoint:
         if progress is not None:
@@ -376,10 +418,7 @@ def fit_segments(
         again = point.reweighted()
         return again if again is not point else point.with_new_directions(_OUTDATED)
 
-    begin = FitPoint.begin(plant, segments, keys, settings.robust, priors, starts)
-    if not np.isfinite(begin.cost):
-        raise SimulationError(f"{plant.model.name!r} leaves all bounds from where the records show its states")
-    if not keys:
+    if not len(begin.parameters):
         return Fit(begin.at_rest(), True, 0)
     steps = 0
     while True:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -91,6 +91,10 @@ class Parameters:
     def after(self, first: int) -> Parameters:
         """Without the ``first`` ones."""
         return Parameters(self.keys[first:], *(a[first:] for a in self._arrays))
+
+    def chosen(self, places: Sequence[int]) -> Parameters:
+        """Those at these places alone."""
+        return Parameters(tuple(self.keys[i] for i in places), *(a[places] for a in self._arrays))
 
     def first(self, number: int) -> Parameters:
         """The first ones alone."""

@@ -19,7 +19,7 @@ import numpy as np
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.plant import Plant
-from hydraulic_sysid.estimation.fit import FitPoint
+from hydraulic_sysid.estimation.fit import FitPoint, fit_from
 from hydraulic_sysid.estimation.refinement import outlying
 
 from .candidate_fits import at_best
@@ -235,13 +235,13 @@ class Search(RecordingFits):
 
         Infinite where it does not run.
         """
-        model, prior = at.model, 0.0
-        if number is not None:
-            key, value = number
-            mean, std = self.priors.get(key, (value, 1.0))
-            model, prior = model.with_entry(key, value=value, free=False), ((value - mean) / std) ** 2
+        begin, prior = at.point.of(at.split.fit), 0.0
         with suppress(SimulationError):
-            return self.fitted_to(at.split.to_fit, model, self._last).point.cost + prior
+            if number is not None:
+                key, value = number
+                mean, std = self.priors.get(key, (value, 1.0))
+                begin, prior = begin.holding(key, value), ((value - mean) / std) ** 2
+            return fit_from(begin, self._last, progress=lambda *_: self.say.left()).cost + prior
         return math.inf
 
     def so_far(self) -> SearchResult:
