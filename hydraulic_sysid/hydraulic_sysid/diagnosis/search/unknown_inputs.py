@@ -39,7 +39,8 @@ class UnknownInput:
 def unknown_inputs(at: Linearisation, say: Callable[[str], None]) -> list[UnknownInput]:
     """At every place of the plant, the one that would explain most first."""
     part, _ = at.sample(CRITERIA.enough_to_score)
-    over_time = [place for place in places(part, say) if place.variable == "time"]
+    say("where an addition of any course may act")
+    over_time = [place for place in places(part) if place.variable == "time"]
     found = list[UnknownInput]()
     for knots in KNOTS:
         if found and _alone(found):
