@@ -92,12 +92,13 @@ def test_among_curves_that_are_no_law_the_place_decides() -> None:
     ("share", "subsystem", "said"),
     [
         (0.97, "supply", "; a supply, of any course in time, would explain 97 %"),
-        (0.3, "sensor", ": it may be in how the motion is read."),
+        (0.3, "supply", "; a supply, of any course in time, would explain 30 %"),
+        (0.1, "sensor", ": it may be in how the motion is read."),
     ],
 )
 def test_without_a_curve_any_course_says_where(share: float, subsystem: str, said: str) -> None:
     supply = UnknownInput("supply", "supply", "a supply of any shape", share)
-    inputs = [supply, UnknownInput("force", "force", "a force of any shape", 0.1)]
+    inputs = [supply, UnknownInput("force", "force", "a force of any shape", 0.05)]
     where = Whereabouts.of(cast(Any, [curve("force", "force", 0.05)]), inputs)
     assert where.subsystem == subsystem
     assert where.sentence(None).startswith(f"No curve at any place of the plant would explain 12 % of it{said}")

@@ -52,8 +52,8 @@ class Whereabouts:
 
     @property
     def clear(self) -> bool:
-        """Whether an addition of any course explains the most of it somewhere, and none to the position's reading."""
-        if not self.inputs or self.inputs[0].share < CRITERIA.most_of:
+        """Whether an addition of any course explains a part of it somewhere, and one to the position's reading less."""
+        if not self.inputs or self.inputs[0].share < CRITERIA.details:
             return False
         return not any(u.subsystem == READING and u.share > CRITERIA.nearly * self.inputs[0].share for u in self.inputs)
 
