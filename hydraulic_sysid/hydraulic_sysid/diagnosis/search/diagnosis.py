@@ -54,8 +54,9 @@ class Remaining:
         cls, at: Linearisation, curves: Sequence[NonparametricCurve] | None = None, beside: Sequence[str] = ()
     ) -> Remaining:
         """What is left at a fitted model."""
-        found = nonparametric_curves(at, lambda _: None) if curves is None else curves
-        return cls(at.sample(SAMPLED)[0], found, beside)
+        if curves is None:
+            curves = Whereabouts.of(nonparametric_curves(at, _silent), unknown_inputs(at, _silent)).curves
+        return cls(at.sample(SAMPLED)[0], curves, beside)
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,10 @@ def diagnose(
         say("balances")
         rows, rows_after = _balances(before, records), _balances(after, records) if after else []
         return Diagnosis(done, competing, with_balances(whole, rows, rows_after), remaining)
+
+
+def _silent(_: str) -> None:
+    """No progress."""
 
 
 def finished(found: SearchResult, known: Mapping[str, Known]) -> Model:
