@@ -27,7 +27,7 @@ from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit, refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.linearisation import Linearisation
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, misfit
-from hydraulic_sysid.diagnosis.search.recording_faults import RecordingFault
+from hydraulic_sysid.diagnosis.search.recording_faults import RecordingFault, recording_faults
 from hydraulic_sysid.diagnosis.search.recording_fits import RecordingFits
 from hydraulic_sysid.diagnosis.search.score_test import score
 from hydraulic_sysid.diagnosis.search.search import Search
@@ -299,6 +299,23 @@ def test_what_a_bent_model_hides_shows_beside_the_values_of_its_file(model: Mode
     assert found[0].refit.model.value("moving_mass") == model.value("moving_mass")
     names = [s.effect.name for s in fits.scores(base)]
     assert names.index("structural_flexibility") > 0
+
+
+def test_a_low_pass_is_found_in_its_size_where_small_delays_hide_a_part_of_it(model: Model) -> None:
+    """They are what the noise was judged with, and go when a fault is assumed."""
+    lag, hidden = 1.5 * DT, 0.35 * DT
+    run = swept(model)
+    slow = {c: Reading(lag=lag).applied(run[c][None], DT)[0] for c in ("pressure_a", "pressure_b")}
+    record = Record("slow", np.asarray(run.time), DT, {"drive": run["drive"], "position": run["position"], **slow})
+    parts = split([record], [], model, 0.5)
+    small = [
+        replace(s, readings=tuple(Reading(delay=-hidden if c == "position" else hidden) for c in s.channels))
+        for s in parts.segments
+    ]
+    at = Linearisation.of(model, replace(parts, segments=small))
+    found = next(f for f in recording_faults(at, disturbances=False) if f.hypothesis.name == "pressures_low_pass")
+    assert found.size == pytest.approx(lag, rel=0.15)
+    assert all(r.delay == 0.0 for s in found.applied(at) for r in s.readings)
 
 
 def test_what_a_low_pass_may_have_held_counts_against_it(model: Model) -> None:

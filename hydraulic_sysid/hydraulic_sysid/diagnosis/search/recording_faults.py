@@ -121,8 +121,7 @@ class RecordingFault:
         """
         if isinstance(self.hypothesis, DriveHypothesis):
             return list(segments)
-        begin = segments if self.unit == "1" else [without_small_delays(s) for s in segments]
-        return [self.hypothesis.applied(s, self.size) for s in begin]
+        return [self.hypothesis.applied(s, self.size) for s in _begun(self.hypothesis, segments)]
 
     def starts(self, dt: float) -> list[RecordingFault]:
         """It, and a delay by whole sampling intervals [s] before it: loggers are late by a cycle, not by a part."""
@@ -164,6 +163,11 @@ def other_gains(fault: RecordingFault, channels: AbstractSet[str]) -> list[Recor
     """Gains of the other readings that would make up for a gain; ``channels``: of all records."""
     others = [h for h in HYPOTHESES if h.what == "gain" and h is not fault.hypothesis and h.shown_by(channels)]
     return [replace(fault, hypothesis=h, size=-fault.size, alternatives=()) for h in others]
+
+
+def _begun(hypothesis: Hypothesis, segments: Sequence[Segments]) -> list[Segments]:
+    """Segments to which a fault may be applied."""
+    return list(segments) if hypothesis.what == "gain" else [without_small_delays(s) for s in segments]
 
 
 def without_small_delays(segments: Segments) -> Segments:
@@ -227,10 +231,10 @@ def _best(
     share: float,
     begin: float | None = None,
 ) -> RecordingFault | None:
-    unit = hypothesis.step(part.split.interval)
+    unit, begun = hypothesis.step(part.split.interval), _begun(hypothesis, part.point.shooting.segments)
 
     def cost(size: float) -> float:
-        changed = [hypothesis.applied(s, size * unit) for s in part.point.shooting.segments]
+        changed = [hypothesis.applied(s, size * unit) for s in begun]
         every = zip(changed, runs, part.point.projections, strict=True)
         return _cost(part, [segments.deviation(run, p.raw) for segments, run, p in every])
 
