@@ -38,6 +38,7 @@ from hydraulic_sysid.diagnosis.search.nonparametric_curves import (
     places_with_memory,
     unexplained,
 )
+from hydraulic_sysid.diagnosis.search.whereabouts import Whereabouts
 from hydraulic_sysid.estimation.fit import FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parameters import Priors
@@ -46,7 +47,7 @@ from .effect_file import effect_text
 from .laws import FINE, PERIODIC, CurveEquations, FittedLaw, best_law, spline
 
 NEAR = 0.8  # of the reduction of the best curve, from which another is fitted too
-MOST_FITTED = 2
+MOST_FITTED = 4
 CLEAR = 0.5  # of what noise does not explain, below which periodic laws are looked for too
 PERIODIC_PLACES = (
     ("unknown_force", "position"), ("unknown_force", "time"), ("unknown_friction", "position"),
@@ -148,10 +149,10 @@ def propose(
     :param name: of the effect, which is that of its file
     :param records: names of those that it is learned from
     """
-    part, curves, beside = left.at, left.curves, left.beside
+    part, where, beside = left.at, left.where, left.beside
     with tempfile.TemporaryDirectory() as folder:
         found = list[_Fit]()
-        for number, candidate in enumerate(_worth_fitting(part, curves, say)):
+        for number, candidate in enumerate(_worth_fitting(part, where, say)):
             if any(_explained(part, f) > PLENTY for f in found):
                 break
             say(f"fitting a curve over {candidate.words}")
@@ -170,7 +171,7 @@ def propose(
     effect = final.place.effect
     evidence = (
         f"Of what the model leaves beyond the noise, such a curve over the {final.words} explains {percent(share)}, "
-        f"all free parameters refitted. {_others(curves, final.place)}"
+        f"all free parameters refitted. {_others(where.curves, final.place)}"
     )
     place, fitted, extent = final.place, final.fitted, _extent(final.place.values)
     knots = np.linspace(*extent, _SHOWN, dtype=np.float64)
@@ -181,14 +182,12 @@ def propose(
     )  # fmt: skip
 
 
-def _worth_fitting(
-    part: Linearisation, curves: Sequence[NonparametricCurve], say: Callable[[str], None]
-) -> Iterator[Candidate]:
+def _worth_fitting(part: Linearisation, where: Whereabouts, say: Callable[[str], None]) -> Iterator[Candidate]:
     """Curves that are fitted one after the other, until one explains `PLENTY`."""
     if drives_by_force(part.model):
         say("curves of the force that the motion asks for")
         yield from _by_force(part)
-    yield from _candidates(part, curves, say)[:MOST_FITTED]
+    yield from _candidates(part, where, say)[:MOST_FITTED]
     late = None if drives_by_force(part.model) else _with_memory(part, say)
     if late is not None:
         yield late
@@ -215,13 +214,16 @@ def _curve_by_force(forces: Forces, place: Place) -> ForceCurve:
     return forces.curve(place, np.linspace(low, high, _FORCE_KNOTS, dtype=np.float64))
 
 
-def _candidates(
-    part: Linearisation, curves: Sequence[NonparametricCurve], say: Callable[[str], None]
-) -> list[Candidate]:
-    """The best places with splines, the one that explains most first; those near it alone."""
+def _candidates(part: Linearisation, where: Whereabouts, say: Callable[[str], None]) -> list[Candidate]:
+    """The best places with splines, the one that explains most first; those near it and those at a known place alone.
+
+    What a curve explains is known to first order only, and the place better than the variable. A curve over the time is
+    no law, unless it is periodic or nothing else does as well: it comes last.
+    """
+    curves, known = where.curves, where.place
     if not curves:
         return []
-    wanted = {(c.place, c.variable) for c in curves[: 2 * MOST_FITTED]}
+    wanted = {(c.place, c.variable) for c in [*curves[:MOST_FITTED], *(c for c in curves if c.place == known)]}
     periodic = set(PERIODIC_PLACES) if curves[0].share < CLEAR else set()
     found = []
     for place in places(part):
@@ -231,7 +233,8 @@ def _candidates(
             say(f"periodic laws over {place.variable}")
             found.append(_candidate(part, place, PERIODIC))
     every = sorted((c for c in found if c is not None), key=lambda c: -c.fitted.reduction)
-    return [c for c in every if c.fitted.reduction >= NEAR * every[0].fitted.reduction]
+    kept = [c for c in every if c.fitted.reduction >= NEAR * every[0].fitted.reduction or c.place.effect.name == known]
+    return sorted(kept, key=lambda c: c.place.variable == "time" and c.fitted.law.name != "periodic")
 
 
 def _with_memory(part: Linearisation, say: Callable[[str], None]) -> Candidate | None:

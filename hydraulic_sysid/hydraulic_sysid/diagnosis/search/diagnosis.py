@@ -23,7 +23,7 @@ from .data_sheet import as_filed
 from .document import document, with_balances
 from .linearisation import Linearisation
 from .misfit import explained
-from .nonparametric_curves import NonparametricCurve, nonparametric_curves
+from .nonparametric_curves import nonparametric_curves
 from .progress import Watch
 from .search import Search
 from .search_state import SearchResult
@@ -40,23 +40,21 @@ HASTE = "A quick look: what is small may be missed."
 
 @dataclass(frozen=True)
 class Remaining:
-    """What no effect of the library explains: a sample of the fitted model's segments, and the curves of what is left.
+    """What no effect of the library explains: a sample of the fitted model's segments, and where it comes from.
 
     ``beside``: effects that were added to this model.
     """
 
     at: Linearisation
-    curves: Sequence[NonparametricCurve]
+    where: Whereabouts
     beside: Sequence[str] = ()
 
     @classmethod
-    def of(
-        cls, at: Linearisation, curves: Sequence[NonparametricCurve] | None = None, beside: Sequence[str] = ()
-    ) -> Remaining:
+    def of(cls, at: Linearisation, where: Whereabouts | None = None, beside: Sequence[str] = ()) -> Remaining:
         """What is left at a fitted model."""
-        if curves is None:
-            curves = Whereabouts.of(nonparametric_curves(at, _silent), unknown_inputs(at, _silent)).curves
-        return cls(at.sample(SAMPLED)[0], curves, beside)
+        if where is None:
+            where = Whereabouts.of(nonparametric_curves(at, _silent), unknown_inputs(at, _silent))
+        return cls(at.sample(SAMPLED)[0], where, beside)
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,7 @@ def diagnose(
             outside = verdict.kind == verdicts.OUTSIDE
             where = Whereabouts.of(curves, unknown_inputs(suspect.linearisation, say)) if outside else where
         beside = () if suspect is found.base else tuple(found.added)
-        remaining = Remaining.of(suspect.linearisation, where.curves, beside) if outside else None
+        remaining = Remaining.of(suspect.linearisation, where, beside) if outside else None
         if not outside:  # else nothing says of any model that it is right
             found = search.with_final_values(found)
         known = search.known_of(found, () if outside else found.named)

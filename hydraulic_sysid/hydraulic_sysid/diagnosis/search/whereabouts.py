@@ -51,6 +51,11 @@ class Whereabouts:
         return not self.inputs or self.bound(curve.place) >= CRITERIA.nearly * self.inputs[0].share
 
     @property
+    def place(self) -> str | None:
+        """Where an addition of any course explains nearly all, and more than elsewhere; None if that is nowhere."""
+        return self.inputs[0].place if self.inputs and self.inputs[0].share > CRITERIA.nearly else None
+
+    @property
     def clear(self) -> bool:
         """Whether an addition of any course explains a part of it somewhere, and one to the position's reading less."""
         if not self.inputs or self.inputs[0].share < CRITERIA.details:
