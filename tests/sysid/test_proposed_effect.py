@@ -28,8 +28,11 @@ from hydraulic_sysid.diagnosis.proposed_effect.laws import (
     best_law,
     spline,
 )
+from hydraulic_sysid.diagnosis.search.diagnosis import Remaining
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES, WITH_MEMORY
 from hydraulic_sysid.diagnosis.search.nonparametric_curves import Place, curve_normal
+from hydraulic_sysid.diagnosis.search.unknown_inputs import UnknownInput
+from hydraulic_sysid.diagnosis.search.whereabouts import Whereabouts
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parameters import Parameters
 
@@ -259,3 +262,40 @@ def test_the_name_of_a_record_runs_nothing(tmp_path: Path) -> None:
     path = tmp_path / "written.py"
     path.write_text(effect_text(place(hat, variable), fitted, (0.0, 2.0), "Evidence.", hostile))
     assert "import os" in load_effect(path).effect.source
+
+
+@pytest.mark.parametrize(
+    ("known", "fitted"),
+    [
+        (0.95, ["leak speed", "leak position", "leak time"]),  # the place is known: all that it may follow, and
+        (0.6, ["leak speed", "leak time"]),  # a curve over the time, which says nothing of other records, last
+    ],
+)
+def test_what_is_fitted_is_what_may_be_the_law(
+    monkeypatch: pytest.MonkeyPatch, known: float, fitted: list[str]
+) -> None:
+    shares = {("leak", "time"): 0.5, ("leak", "speed"): 0.48, ("leak", "position"): 0.2, ("force", "speed"): 0.3}
+
+    def at(key: tuple[str, str]) -> Any:
+        return SimpleNamespace(key=key, effect=SimpleNamespace(name=key[0]), variable=key[1])
+
+    def candidate(_part: object, place: Any, _number: int) -> Any:
+        law = SimpleNamespace(reduction=shares[place.key], law=SimpleNamespace(name="spline"))
+        return SimpleNamespace(place=place, fitted=law, words=" ".join(place.key))
+
+    tried = list[str]()
+
+    def fit(_part: object, found: Any, *_: object) -> None:
+        tried.append(found.words)
+        raise SimulationError("it does not run")
+
+    for name, one in {
+        "places": lambda *_: map(at, shares), "_candidate": candidate, "_fitted": fit, "PERIODIC_PLACES": (),
+        "drives_by_force": lambda _: False, "_with_memory": lambda *_: None,
+    }.items():  # fmt: skip
+        monkeypatch.setattr(f"hydraulic_sysid.diagnosis.proposed_effect.proposal.{name}", one)
+    curves: Any = [SimpleNamespace(place=p, variable=v, subsystem=p, share=s) for (p, v), s in shares.items()]
+    inputs = [UnknownInput("leak", "flow", "a leak", known), UnknownInput("force", "force", "a force", 0.3)]
+    part: Any = SimpleNamespace(model=None)
+    assert proposal.propose(Remaining(part, Whereabouts(curves, inputs)), "own", ["a"]) is None
+    assert tried == fitted
