@@ -7,9 +7,10 @@ something is a bent one, and what is missing looks different from it. From there
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ from .effect_file import effect_text
 from .laws import FINE, PERIODIC, CurveEquations, FittedLaw, best_law, spline
 
 NEAR = 0.8  # of the reduction of the best curve, from which another is fitted too
-MOST_FITTED = 4
+MOST_FITTED = 3
 CLEAR = 0.5  # of what noise does not explain, below which periodic laws are looked for too
 PERIODIC_PLACES = (
     ("unknown_force", "position"), ("unknown_force", "time"), ("unknown_friction", "position"),
@@ -57,7 +58,8 @@ PERIODIC_PLACES = (
 HOLDS = 0.9  # of what a curve explains, which a law taken from it must explain as it is: else the curve is written
 LEAST = 0.5  # of what noise does not explain, which a law must explain to be worth a file
 PLENTY = 0.8
-"""Of what noise does not explain: a curve that explains so much ends the search for others."""
+"""Of what noise does not explain: a curve that explains so much ends the search for others, …"""
+ALL = 0.95  # … but for one over the time, as what drifts may look like a law of the motion
 LAGS = (2.0, 8.0, 32.0)  # sampling intervals by which it may follow, to begin with
 FORCE_LAGS = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # likewise, where nothing is simulated
 FORCES, MOTION = ("unknown_force", "unknown_friction"), ("position", "velocity", "speed")
@@ -129,6 +131,11 @@ class Candidate:
         """The variable."""
         return self.place.variable.replace("_", " ")
 
+    @property
+    def over_time(self) -> bool:
+        """Whether it is no law: it only says when."""
+        return self.place.variable == "time" and self.fitted.law.name != "periodic"
+
 
 @dataclass(frozen=True)
 class _Fit:
@@ -151,16 +158,19 @@ def propose(
     """
     part, where, beside = left.at, left.where, left.beside
     with tempfile.TemporaryDirectory() as folder:
-        found = list[_Fit]()
-        for number, candidate in enumerate(_worth_fitting(part, where, say)):
-            if any(_explained(part, f) > PLENTY for f in found):
-                break
-            say(f"fitting a curve over {candidate.words}")
-            with suppress(HydraulicError):  # the plant does not run with it
-                found.append(_fitted(part, candidate, Path(folder) / str(number) / f"{name}.py", records))
+        found, number = list[_Fit](), count()
+        for enough, candidates in _worth_fitting(part, where, say):
+            some = iter(candidates)
+            while not any(_explained(part, f) > enough for f in found):
+                candidate = next(some, None)
+                if candidate is None:
+                    break
+                say(f"fitting a curve over {candidate.words}")
+                with suppress(HydraulicError):  # the plant does not run with it
+                    found.append(_fitted(part, candidate, Path(folder) / str(next(number)) / f"{name}.py", records))
         if not found:
             return None
-        first = min(found, key=lambda f: f.cost)
+        first = _best(part, found)
         share = min(_explained(part, first), 1.0)
         if share < LEAST:
             return None
@@ -182,15 +192,28 @@ def propose(
     )  # fmt: skip
 
 
-def _worth_fitting(part: Linearisation, where: Whereabouts, say: Callable[[str], None]) -> Iterator[Candidate]:
-    """Curves that are fitted one after the other, until one explains `PLENTY`."""
-    if drives_by_force(part.model):
+def _best(part: Linearisation, found: Sequence[_Fit]) -> _Fit:
+    """The one that leaves least; one over the time only if it leaves less than half of what any other does."""
+    laws = [f for f in found if not f.candidate.over_time]
+    first, noise = min(found, key=lambda f: f.cost), _cost(part) - unexplained(part)
+    if first.candidate.over_time and laws:
+        other = min(laws, key=lambda f: f.cost)
+        return first if first.cost - noise < 0.5 * (other.cost - noise) else other
+    return first
+
+
+def _worth_fitting(
+    part: Linearisation, where: Whereabouts, say: Callable[[str], None]
+) -> Iterator[tuple[float, Iterable[Candidate]]]:
+    """Curves that are fitted one after the other, each kind until one explains so much."""
+    by_force = drives_by_force(part.model)
+    if by_force:
         say("curves of the force that the motion asks for")
-        yield from _by_force(part)
-    yield from _candidates(part, where, say)[:MOST_FITTED]
-    late = None if drives_by_force(part.model) else _with_memory(part, say)
-    if late is not None:
-        yield late
+        yield PLENTY, _by_force(part)
+    every = _candidates(part, where, say)
+    yield PLENTY, [c for c in every if not c.over_time][:MOST_FITTED]
+    yield ALL, [c for c in every if c.over_time][:1]
+    yield PLENTY, () if by_force else _with_memory(part, say)
 
 
 def _by_force(part: Linearisation) -> list[Candidate]:
@@ -217,13 +240,12 @@ def _curve_by_force(forces: Forces, place: Place) -> ForceCurve:
 def _candidates(part: Linearisation, where: Whereabouts, say: Callable[[str], None]) -> list[Candidate]:
     """The best places with splines, the one that explains most first; those near it and those at a known place alone.
 
-    What a curve explains is known to first order only, and the place better than the variable. A curve over the time is
-    no law, unless it is periodic or nothing else does as well: it comes last.
+    What a curve explains is known to first order only, and the place better than the variable.
     """
     curves, known = where.curves, where.place
     if not curves:
         return []
-    wanted = {(c.place, c.variable) for c in [*curves[:MOST_FITTED], *(c for c in curves if c.place == known)]}
+    wanted = {(c.place, c.variable) for c in [*curves[: MOST_FITTED + 1], *(c for c in curves if c.place == known)]}
     periodic = set(PERIODIC_PLACES) if curves[0].share < CLEAR else set()
     found = []
     for place in places(part):
@@ -233,16 +255,18 @@ def _candidates(part: Linearisation, where: Whereabouts, say: Callable[[str], No
             say(f"periodic laws over {place.variable}")
             found.append(_candidate(part, place, PERIODIC))
     every = sorted((c for c in found if c is not None), key=lambda c: -c.fitted.reduction)
-    kept = [c for c in every if c.fitted.reduction >= NEAR * every[0].fitted.reduction or c.place.effect.name == known]
-    return sorted(kept, key=lambda c: c.place.variable == "time" and c.fitted.law.name != "periodic")
+    least = NEAR * every[0].fitted.reduction if every else 0.0
+    return [c for c in every if c.fitted.reduction >= least or c.place.effect.name == known]
 
 
-def _with_memory(part: Linearisation, say: Callable[[str], None]) -> Candidate | None:
-    """The best place for a curve that remembers."""
+def _with_memory(part: Linearisation, say: Callable[[str], None]) -> Iterator[Candidate]:
+    """The best place for a curve that remembers, if there is any; looked for when it is asked for."""
     sample, _ = part.sample(CRITERIA.enough_to_score)
     rough = [(curve(sample, place), place) for place in places_with_memory(sample, _lags(part, LAGS), say)]
     found = [(c.reduction, number) for number, (c, _) in enumerate(rough) if c is not None]
-    return _candidate(part, rough[max(found)[1]][1], FINE) if found else None
+    late = _candidate(part, rough[max(found)[1]][1], FINE) if found else None
+    if late is not None:
+        yield late
 
 
 def _lags(part: Linearisation, samples: Sequence[float]) -> list[float]:
