@@ -291,7 +291,7 @@ def test_what_is_fitted_is_what_may_be_the_law(
 
     for name, one in {
         "places": lambda *_: map(at, shares), "_candidate": candidate, "_fitted": fit, "PERIODIC_PLACES": (),
-        "drives_by_force": lambda _: False, "_with_memory": lambda *_: (),
+        "drives_by_force": lambda _: False, "_with_memory": lambda *_: None,
     }.items():  # fmt: skip
         monkeypatch.setattr(f"hydraulic_sysid.diagnosis.proposed_effect.proposal.{name}", one)
     curves: Any = [SimpleNamespace(place=p, variable=v, subsystem=p, share=s) for (p, v), s in shares.items()]

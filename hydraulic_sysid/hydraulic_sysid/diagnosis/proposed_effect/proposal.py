@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -158,16 +157,15 @@ def propose(
     """
     part, where, beside = left.at, left.where, left.beside
     with tempfile.TemporaryDirectory() as folder:
-        found, number = list[_Fit](), count()
-        for enough, candidates in _worth_fitting(part, where, say):
-            some = iter(candidates)
-            while not any(_explained(part, f) > enough for f in found):
-                candidate = next(some, None)
-                if candidate is None:
-                    break
-                say(f"fitting a curve over {candidate.words}")
-                with suppress(HydraulicError):  # the plant does not run with it
-                    found.append(_fitted(part, candidate, Path(folder) / str(next(number)) / f"{name}.py", records))
+        found = list[_Fit]()
+
+        def explained(share: float) -> bool:
+            return any(_explained(part, f) > share for f in found)
+
+        for number, candidate in enumerate(_worth_fitting(part, where, explained, say)):
+            say(f"fitting a curve over {candidate.words}")
+            with suppress(HydraulicError):  # the plant does not run with it
+                found.append(_fitted(part, candidate, Path(folder) / str(number) / f"{name}.py", records))
         if not found:
             return None
         first = _best(part, found)
@@ -203,17 +201,28 @@ def _best(part: Linearisation, found: Sequence[_Fit]) -> _Fit:
 
 
 def _worth_fitting(
-    part: Linearisation, where: Whereabouts, say: Callable[[str], None]
-) -> Iterator[tuple[float, Iterable[Candidate]]]:
-    """Curves that are fitted one after the other, each kind until one explains so much."""
+    part: Linearisation, where: Whereabouts, explained: Callable[[float], bool], say: Callable[[str], None]
+) -> Iterator[Candidate]:
+    """Curves that are fitted one after the other, until one has ``explained`` so much."""
+
+    def until(share: float, candidates: Iterable[Candidate]) -> Iterator[Candidate]:
+        for candidate in candidates:
+            if explained(share):
+                return
+            yield candidate
+
     by_force = drives_by_force(part.model)
     if by_force:
         say("curves of the force that the motion asks for")
-        yield PLENTY, _by_force(part)
+        yield from until(PLENTY, _by_force(part))
+        if explained(PLENTY):
+            return
     every = _candidates(part, where, say)
-    yield PLENTY, [c for c in every if not c.over_time][:MOST_FITTED]
-    yield ALL, [c for c in every if c.over_time][:1]
-    yield PLENTY, () if by_force else _with_memory(part, say)
+    yield from until(PLENTY, [c for c in every if not c.over_time][:MOST_FITTED])
+    yield from until(ALL, [c for c in every if c.over_time][:1])
+    late = None if by_force or explained(PLENTY) else _with_memory(part, say)
+    if late is not None:
+        yield late
 
 
 def _by_force(part: Linearisation) -> list[Candidate]:
@@ -259,14 +268,12 @@ def _candidates(part: Linearisation, where: Whereabouts, say: Callable[[str], No
     return [c for c in every if c.fitted.reduction >= least or c.place.effect.name == known]
 
 
-def _with_memory(part: Linearisation, say: Callable[[str], None]) -> Iterator[Candidate]:
-    """The best place for a curve that remembers, if there is any; looked for when it is asked for."""
+def _with_memory(part: Linearisation, say: Callable[[str], None]) -> Candidate | None:
+    """The best place for a curve that remembers."""
     sample, _ = part.sample(CRITERIA.enough_to_score)
     rough = [(curve(sample, place), place) for place in places_with_memory(sample, _lags(part, LAGS), say)]
     found = [(c.reduction, number) for number, (c, _) in enumerate(rough) if c is not None]
-    late = _candidate(part, rough[max(found)[1]][1], FINE) if found else None
-    if late is not None:
-        yield late
+    return _candidate(part, rough[max(found)[1]][1], FINE) if found else None
 
 
 def _lags(part: Linearisation, samples: Sequence[float]) -> list[float]:

@@ -20,6 +20,7 @@ from hydraulic_sim.errors import ModelError, SimulationError
 from hydraulic_sim.plant import Plant
 from hydraulic_sysid.diagnosis.locate.basis import lagged
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
+from hydraulic_sysid.estimation.parameters import Parameters
 from hydraulic_sysid.estimation.segments import Segments
 
 from .candidates import subsystem
@@ -133,8 +134,8 @@ def _extended(at: Linearisation, files: Sequence[Path], say: Callable[[str], Non
 def curve_normal(at: Linearisation, place: Place, knots: Array) -> NormalEquations | None:
     """Of the heights (K,) of hat functions at equally spaced ``knots`` (K,), over those of the height's default.
 
-    The free parameters are eliminated, each as one that may be anywhere between its bounds (a variance of a twelfth of
-    their distance squared): what only they could undo, no curve may do. None where the plant does not run.
+    The free parameters are eliminated, each as one that may be `anywhere_allowed`: what only they could undo, no curve
+    may do. None where the plant does not run.
     """
     name, width = place.effect.name, float(knots[1] - knots[0])
     hats = [
@@ -151,9 +152,14 @@ def curve_normal(at: Linearisation, place: Place, knots: Array) -> NormalEquatio
         return None
     normal, own = at.bordered([c[..., 1:] - c[..., :1] for c in changed]), len(at.parameters)
     information = normal.information.copy()
-    down, up = at.parameters.reach
-    information[np.arange(own), np.arange(own)] += 12.0 / (up - down) ** 2
+    information[np.arange(own), np.arange(own)] += anywhere_allowed(at.parameters)
     return replace(normal, information=information).marginal(own)
+
+
+def anywhere_allowed(parameters: Parameters) -> Array:
+    """Information (P,) of being anywhere between bounds: the variance is a twelfth of their distance squared."""
+    down, up = parameters.reach
+    return 12.0 / (up - down) ** 2
 
 
 def curve_between(

@@ -20,7 +20,7 @@ from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from .candidates import subsystem
 from .criteria import CRITERIA
 from .linearisation import Linearisation
-from .nonparametric_curves import Place, places, unexplained
+from .nonparametric_curves import Place, anywhere_allowed, places, unexplained
 
 KNOTS = (6, 12, 24)  # in the length of a segment, the more where fewer do not tell one subsystem from all others
 _FAINT = 1e-6  # of the largest change that a course makes in a segment: one that changes less is none
@@ -77,8 +77,7 @@ def _share(at: Linearisation, place: Place, knots: int) -> float:
     except SimulationError:
         return 0.0
     own = at.point.beyond([c[..., 1:] - c[..., :1] for c in changed])
-    down, up = at.parameters.reach
-    information = np.diag(at.parameters.prior_information + 12.0 / (up - down) ** 2)
+    information = np.diag(at.parameters.prior_information + anywhere_allowed(at.parameters))
     scores, left, freedom = list[Array](), 0.0, 0
     for columns, residual, courses_here in zip(at.beyond, at.residual, own, strict=True):
         basis = _basis(courses_here)
