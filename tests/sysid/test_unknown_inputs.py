@@ -57,6 +57,20 @@ def test_an_input_that_follows_no_law_is_found_where_it_acts(
     assert (best.subsystem, best.share > 0.9) == (subsystem, True), found
 
 
+def test_of_the_position_alone_its_reading_explains_no_more_than_what_else_explains_most(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(nonparametric_curves, "FILES", tuple(f for f in FILES if f.stem in PLACES))
+    t, rng = DT * np.arange(round(SECONDS / DT)), np.random.default_rng(4)
+    drive = 2.5 * np.sin(2.0 * np.pi * (0.4 + 0.6 * t) * t)
+    run = Plant(model.with_values({"viscous_friction.coefficient": 3000.0})).simulate(drive, DT)
+    position = np.asarray(run.position) + rng.normal(0.0, NOISE["position"], t.size)
+    record = Record("alone", t, DT, {"drive": drive, "position": position})
+    found = unknown_inputs(Linearisation.of(model, split([record], [], model, 0.5)), lambda _: None)
+    shares = {u.place: u.share for u in found}
+    assert shares["unknown_reading"] <= max(share for place, share in shares.items() if place != "unknown_reading")
+
+
 def curve(place: str, subsystem: str, share: float) -> Any:
     summary = f"{place} of any shape"
     return SimpleNamespace(place=place, subsystem=subsystem, share=share, summary=summary, variable="time")

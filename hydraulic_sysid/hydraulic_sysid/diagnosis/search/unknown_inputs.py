@@ -23,6 +23,7 @@ from .linearisation import Linearisation
 from .nonparametric_curves import Place, anywhere_allowed, places, unexplained
 
 KNOTS = (6, 12, 24)  # in the length of a segment, the more where fewer do not tell one subsystem from all others
+READS = "position_sensor"  # slot of the position's reading
 _FAINT = 1e-6  # of the largest change that a course makes in a segment: one that changes less is none
 
 
@@ -46,6 +47,10 @@ def unknown_inputs(at: Linearisation, say: Callable[[str], None]) -> list[Unknow
         if found and _alone(found):
             break
         shares = [_share(part, place, knots) for place in over_time]
+        if part.split.channels == ["position"]:
+            # Its reading explains whatever it reads, and so no more than what explains most else.
+            most = max((u for p, u in zip(over_time, shares, strict=True) if p.effect.slot != READS), default=0.0)
+            shares = [min(u, most) for u in shares]
         found = [
             UnknownInput(p.effect.name, subsystem(p.effect), p.effect.summary, share)
             for p, share in zip(over_time, shares, strict=True)
