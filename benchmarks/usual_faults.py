@@ -92,7 +92,7 @@ def slow_transducers(table: dict[str, np.ndarray], _: np.random.Generator) -> di
 
 def spiky(table: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
     found = {name: values.copy() for name, values in table.items()}
-    for name, noise in (("position_m", 2e-5), *((p, 2e4) for p in PRESSURES)):
+    for name, noise in NOISE.items():
         sensors.spiked(found[name], rng, SPIKES, 50.0 * noise)
     return found
 

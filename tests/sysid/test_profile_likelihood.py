@@ -67,7 +67,7 @@ def test_a_fit_beside_a_parameter_that_is_held_begins_where_the_others_are_and_e
     at = fitted(bench, FREE)
     key, value = LEAKAGE, times * at.model.value(LEAKAGE)
     anew = costs(at)(key, value)
-    known = at.point.of(at.split.fit)
+    known = at.point.with_columns_kept().subset(at.split.fit)
     begin = known.holding(key, value)
     assert key not in begin.parameters.keys and begin.plant.value(key) == value
     # To first order the others are there already, initial states as well.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 SHOWN: dict[str, tuple[float, str]] = {
     "m": (1e3, "mm"),
@@ -112,6 +113,11 @@ def span(low: float, high: float, unit: str) -> str:
 def percent(share: float | None) -> str:
     """A share in percent to one digit, with a true minus sign; a dash where there is none."""
     return "–" if share is None or share != share else f"{100.0 * share:.1f} %".replace("-", "−")
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words one after the other: "a, b and c"."""
+    return " and ".join(words) if len(words) < 3 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
 def first_upper(text: str) -> str:

@@ -208,11 +208,6 @@ class FitPoint:
         """This point with derivatives of its own."""
         return self if self.derived is None else replace(self, derived=None)
 
-    def of(self, chosen: Sequence[Mask]) -> FitPoint:
-        """`subset`, with the derivatives that are known of this point."""
-        columns = [c[own] for c, own in zip(self.columns, chosen, strict=True) if own.any()]
-        return replace(self.subset(chosen), derived=columns)
-
     def holding(self, key: str, value: float) -> FitPoint:
         """A parameter held at a value, the others and the initial states where they then fit best, to first order.
 
@@ -239,6 +234,10 @@ class FitPoint:
             projections=shooting.seen_from(self.projections, plant, states),
             derived=[c[..., others] for c in self.columns],
         )  # fmt: skip
+
+    def with_columns_kept(self) -> FitPoint:
+        """This point, its derivatives such as go with all that is made from it."""
+        return replace(self, derived=self.columns)
 
     def with_new_directions(self, least: float) -> FitPoint:
         """This point, its directions of the initial states taken anew where they are old.
@@ -330,6 +329,7 @@ class FitPoint:
             shooting=replace(self.shooting, segments=[self.shooting.segments[i].subset(c) for i, c in used]),
             initial_states=[self.initial_states[i][c] for i, c in used],
             projections=[self.projections[i].subset(c) for i, c in used],
+            derived=None if self.derived is None else [self.derived[i][c] for i, c in used],
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.decimation import trace
-from hydraulic_sysid.data.display import number
+from hydraulic_sysid.data.display import listed, number
 from hydraulic_sysid.data.results import heading
 from hydraulic_sysid.excitation import Plan
 from hydraulic_sysid.excitation.simulated_run import SimulatedRun
@@ -158,9 +158,9 @@ def _verdict(design: Design) -> dict[str, str]:
     )
     level = "explained" if worst.separation >= CLEAR else "close" if worst.separation >= _FAINT else "off"
     apart = f"{number(worst.separation)} standard deviations of the noise apart after every refit ({last})"
-    what = f"{number(seconds)} s of {_and(list(dict.fromkeys(c.movement.family.words for c in design.chosen)))}"
+    what = f"{number(seconds)} s of {listed(list(dict.fromkeys(c.movement.family.words for c in design.chosen)))}"
     if level == "explained":
-        text = f"{what} distinguish{'es' if ' and ' not in what else ''} {_and(list(design.models))}: {apart}."
+        text = f"{what} distinguish{'es' if ' and ' not in what else ''} {listed(list(design.models))}: {apart}."
     elif level == "close":
         text = f"{what} hint at which of {_or(list(design.models))} it is: {apart}; about " + (
             f"{number(_seconds(design, worst))} s of it decide."
@@ -175,10 +175,6 @@ def _verdict(design: Design) -> dict[str, str]:
 
 def _traced(seen: SimulatedRun, channel: str) -> dict[str, Any]:
     return trace(seen.record.time, seen.record[channel], _POINTS)
-
-
-def _and(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _or(names: Sequence[str]) -> str:

@@ -59,6 +59,7 @@ LEAST = 0.5  # of what noise does not explain, which a law must explain to be wo
 PLENTY = 0.8
 """Of what noise does not explain: a curve that explains so much ends the search for others, …"""
 ALL = 0.95  # … but for one over the time, as what drifts may look like a law of the motion
+CLEARLY = 0.5  # of what a law leaves, below which such a curve is taken instead
 LAGS = (2.0, 8.0, 32.0)  # sampling intervals by which it may follow, to begin with
 FORCE_LAGS = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # likewise, where nothing is simulated
 FORCES, MOTION = ("unknown_force", "unknown_friction"), ("position", "velocity", "speed")
@@ -193,10 +194,10 @@ def propose(
 def _best(part: Linearisation, found: Sequence[_Fit]) -> _Fit:
     """The one that leaves least; one over the time only if it leaves less than half of what any other does."""
     laws = [f for f in found if not f.candidate.over_time]
-    first, noise = min(found, key=lambda f: f.cost), _cost(part) - unexplained(part)
+    first = min(found, key=lambda f: f.cost)
     if first.candidate.over_time and laws:
         other = min(laws, key=lambda f: f.cost)
-        return first if first.cost - noise < 0.5 * (other.cost - noise) else other
+        return first if 1.0 - _explained(part, first) < CLEARLY * (1.0 - _explained(part, other)) else other
     return first
 
 

@@ -235,7 +235,7 @@ class Search(RecordingFits):
 
         Infinite where it does not run.
         """
-        begin, prior = at.point.of(at.split.fit), 0.0
+        begin, prior = at.point.with_columns_kept().subset(at.split.fit), 0.0
         with suppress(SimulationError):
             if number is not None:
                 key, value = number

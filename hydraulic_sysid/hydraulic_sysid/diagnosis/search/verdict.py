@@ -9,7 +9,7 @@ import numpy as np
 
 from hydraulic_sim.effect import Effect
 from hydraulic_sim.model import Model
-from hydraulic_sysid.data.display import TITLES, UNITS, percent, quantity, resolving
+from hydraulic_sysid.data.display import TITLES, UNITS, listed, percent, quantity, resolving
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.data.records.paired import partner_of
 from hydraulic_sysid.estimation.noise_model import SPIKY
@@ -255,7 +255,7 @@ def sentences(result: SearchResult, verdict: Verdict, where: Whereabouts) -> str
     fell = f"On validation data the residual {how} from {base:.3g} to {final:.3g} × noise."
     if verdict.kind == UNDECIDED:
         reached = (
-            f"{_and(result.added)} added. {fell}" if result.added else f"no effect added, {final:.3g} × noise left."
+            f"{listed(result.added)} added. {fell}" if result.added else f"no effect added, {final:.3g} × noise left."
         )
         return " ".join([f"Undecided: the search was ended before it was done. Best so far: {reached}", *aside])
     if verdict.kind == COMPLETE and result.final.misfit.usual > CRITERIA.small:
@@ -279,7 +279,7 @@ def sentences(result: SearchResult, verdict: Verdict, where: Whereabouts) -> str
         beside.append(remainder_sentence(result.remainders))
     if verdict.kind == MISSING:
         fall = [] if result.by_force is not None else [fell]
-        return " ".join([f"Missing: {_and(result.added)}.", *fall, *_instead(verdict), *_numbers(result), *beside])
+        return " ".join([f"Missing: {listed(result.added)}.", *fall, *_instead(verdict), *_numbers(result), *beside])
     if verdict.kind == INDISTINGUISHABLE:
         parts = []
         for name in result.added:
@@ -287,12 +287,12 @@ def sentences(result: SearchResult, verdict: Verdict, where: Whereabouts) -> str
             parts.append(f"one of {{{', '.join([name, *same])}}}" if same else name)
         why = _why_alike(result.model) if verdict.family else ""
         faults = "".join(f", or nothing is, and {said}" for said in _recording_instead(result))
-        return " ".join([f"Missing: {_and(parts)}{faults}. These data cannot distinguish them. {fell}{why}", *beside])
+        return " ".join([f"Missing: {listed(parts)}{faults}. These data cannot distinguish them. {fell}{why}", *beside])
     none = "no effect of it explains what is left"
     drift = decisive_drift(result)
     text = f"Outside the library: {none if drift is None else f'{_changes(result, drift)}, as no effect does'}. "
     if result.added:
-        text += f"The nearest is {_and(result.added)}. {fell} "
+        text += f"The nearest is {listed(result.added)}. {fell} "
     else:
         text += f"On validation data the residual is {final:.3g} × noise. "
     best = where.curves[0] if where.curves and drift is None else elsewhere(result, where.curves)
@@ -338,7 +338,7 @@ def remainder_sentence(found: Sequence[Remainder]) -> str:
     seen = [r for r in found if r.beyond > CRITERIA.remainder_seen * r.noise]
     if not seen:
         return "Nothing remains beyond the noise."
-    sizes = _and([f"{quantity(r.beyond, UNITS[r.channel], 2)} of {TITLES[r.channel]}" for r in seen])
+    sizes = listed([f"{quantity(r.beyond, UNITS[r.channel], 2)} of {TITLES[r.channel]}" for r in seen])
     most = percent(max(CRITERIA.immaterial, *(r.share for r in seen)))
     return f"What remains beyond the noise is {sizes}, at most {most} of the motion in a segment."
 
@@ -369,7 +369,7 @@ def data_sheet_sentences(result: SearchResult) -> list[str]:
         said = ", or ".join(_deviation(result, one) for one in (d, *d.alternatives))
         tied = ": these data cannot distinguish them"
         if d.instead:
-            said += f". {_and(d.instead)} would explain the same{tied}"
+            said += f". {listed(d.instead)} would explain the same{tied}"
         elif d.alternatives:
             said += tied
         found.append(f"{said}.")
@@ -464,7 +464,7 @@ def warning(named: Sequence[str], imitations: Sequence[str]) -> str:
     if not imitations:
         return ""
     more = ": read those settings first (inspect)" if both else ""
-    return f" The devices on the bus are set so that they imitate {_and(both or list(imitations))}{more}."
+    return f" The devices on the bus are set so that they imitate {listed(both or list(imitations))}{more}."
 
 
 def _instead(verdict: Verdict) -> list[str]:
@@ -477,7 +477,7 @@ def _recording_instead(result: SearchResult) -> list[str]:
     found = [f.text for f in result.faults_instead]
     several = result.together_instead
     if several.faults:
-        found.append(_and([*(f.text for f in several.faults), *(_deviation(result, d) for d in several.numbers)]))
+        found.append(listed([*(f.text for f in several.faults), *(_deviation(result, d) for d in several.numbers)]))
     return found
 
 
@@ -485,8 +485,4 @@ def _numbers(result: SearchResult) -> list[str]:
     found = result.numbers_instead
     if not found:
         return []
-    return [f"Together, {_and([d.key for d in found])} would explain as much as {result.added[-1]}: check them."]
-
-
-def _and(words: Sequence[str]) -> str:
-    return " and ".join(words) if len(words) < 3 else ", ".join(words[:-1]) + " and " + words[-1]
+    return [f"Together, {listed([d.key for d in found])} would explain as much as {result.added[-1]}: check them."]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hydraulic_sysid.data.display import listed
+
 from .criteria import CRITERIA
 from .nonparametric_curves import NonparametricCurve
 from .unknown_inputs import UnknownInput
@@ -100,7 +102,7 @@ class Whereabouts:
         course = f" (of any course in time {100 * self.bound(best.place):.0f} %)" if self.inputs else ""
         said = f"It looks{more} like {_curve(best)}, which would explain {100 * best.share:.0f} % of it{course}"
         others = [f"{_curve(c)} ({100 * c.share:.0f} %)" for c in self.as_likely(best)]
-        return f"{said}; nearly as much: {' and '.join(others)}." if others else f"{said}."
+        return f"{said}; nearly as much: {listed(others)}." if others else f"{said}."
 
 
 def _curve(found: NonparametricCurve) -> str:
