@@ -29,7 +29,7 @@ from hydraulic_sysid.diagnosis.search.frozen_jacobian import Refit
 from hydraulic_sysid.diagnosis.search.holdout import Split, split
 from hydraulic_sysid.diagnosis.search.misfit import Misfit, explained, material, reduction
 from hydraulic_sysid.diagnosis.search.nonparametric import FILES
-from hydraulic_sysid.diagnosis.search.posterior import explanations
+from hydraulic_sysid.diagnosis.search.posterior import explanations, probability
 from hydraulic_sysid.diagnosis.search.progress import OutOfTimeError, Progress
 from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, RecordingFault
 from hydraulic_sysid.diagnosis.search.search import Search
@@ -326,7 +326,26 @@ def test_what_no_curve_explains_is_no_other_effect(model, share: float | None, k
     base, final = state(model, 30000.0, {}), state(model.with_effect("constant_load"), 12000.0, {})
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     curves = [] if share is None else [SimpleNamespace(share=share)]
-    assert verdict.kind_of(found, tied=False, curves=curves) == kind
+    assert verdict.kind_of(found, tied=False, where=Whereabouts(curves)) == kind
+
+
+@pytest.mark.parametrize(
+    ("after", "share", "kind"),
+    [
+        (1.3, 0.7, verdict.OUTSIDE),
+        (1.3, 0.3, verdict.MISSING),  # what follows the motion is no sine
+        (1.02, 0.9, verdict.MISSING),  # nothing is left
+    ],
+)
+def test_what_swings_of_itself_is_outside_the_library(model, after: float, share: float, kind: str) -> None:
+    base, final = state(model, 30000.0, {}), state(model.with_effect("constant_load"), 3000 * after, {})
+    found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
+    where = Whereabouts(sines=[SimpleNamespace(share=share)])
+    assert verdict.kind_of(found, tied=False, where=where) == kind
+    judged = verdict.reviewed(verdict.Verdict(verdict.COMPLETE, found.added, {}, {}), found, where)
+    sure = probability(explanations(found, judged))
+    assert judged.periodic == (kind == verdict.OUTSIDE)
+    assert sure is not None and (not judged.periodic or sure > 0.94)
 
 
 @pytest.mark.parametrize(
@@ -374,7 +393,7 @@ def test_an_effect_that_explains_nearly_all_may_leave_another(model, after: floa
     base, final = state(model, 3000 * 5000.0, {}), state(model.with_effect("constant_load"), 3000 * after, {})
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     assert verdict.kind_of(found, tied=False) == verdict.MISSING
-    assert verdict.kind_of(found, tied=False, curves=[SimpleNamespace(share=share)]) == kind
+    assert verdict.kind_of(found, tied=False, where=Whereabouts([SimpleNamespace(share=share)])) == kind
 
 
 @pytest.mark.parametrize(

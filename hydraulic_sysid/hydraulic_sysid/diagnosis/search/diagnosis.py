@@ -24,12 +24,13 @@ from .document import document, with_balances
 from .linearisation import Linearisation
 from .misfit import explained
 from .nonparametric_curves import nonparametric_curves
+from .periodic_inputs import periodic_inputs
 from .progress import Watch
 from .search import Search
 from .search_state import SearchResult
 from .uncertainty import Known
 from .unknown_inputs import unknown_inputs
-from .whereabouts import Whereabouts
+from .whereabouts import NOT_KNOWN, Whereabouts
 
 BALANCED = 40.0  # s of all records together of which balances are formed, …
 SHORT = 4.0  # … and at least of each
@@ -53,7 +54,8 @@ class Remaining:
     def of(cls, at: Linearisation, where: Whereabouts | None = None, beside: Sequence[str] = ()) -> Remaining:
         """What is left at a fitted model."""
         if where is None:
-            where = Whereabouts.of(nonparametric_curves(at, _silent), unknown_inputs(at, _silent))
+            curves, inputs = nonparametric_curves(at, _silent), unknown_inputs(at, _silent)
+            where = Whereabouts.of(curves, inputs, periodic_inputs(at, _silent))
         return cls(at.sample(SAMPLED)[0], where, beside)
 
 
@@ -111,12 +113,20 @@ def diagnose(
         # Where most is left, what was added is a proxy for something else, and bends curves and balances.
         proxy = explained(found.base.misfit, found.final.misfit) < CRITERIA.hopeless
         suspect = found.base if proxy else found.final
-        where, much = Whereabouts(), found.final.misfit.usual > CRITERIA.right_law
-        if outside or (found.added and much and not (found.by_force or found.stopped)):
-            curves = search.curves(suspect, say)
-            verdict = verdicts.reviewed(verdict, found, curves)
-            outside = verdict.kind == verdicts.OUTSIDE
-            where = Whereabouts.of(curves, unknown_inputs(suspect.linearisation, say)) if outside else where
+        much, open_ = found.final.misfit.usual > CRITERIA.right_law, not (found.by_force or found.stopped)
+        where = NOT_KNOWN
+        if outside or (open_ and not found.final.misfit.little):
+            # What is periodic of itself shows beside what follows the motion, proxy or not.
+            where = Whereabouts(sines=periodic_inputs(found.final.linearisation, say))
+        if outside or (open_ and found.added and much):
+            where = Whereabouts.of(search.curves(suspect, say), (), where.sines)
+        verdict = verdicts.reviewed(verdict, found, where)
+        outside = verdict.kind == verdicts.OUTSIDE
+        where = (
+            Whereabouts.of(search.curves(suspect, say), unknown_inputs(suspect.linearisation, say), where.sines)
+            if outside
+            else NOT_KNOWN
+        )
         beside = () if suspect is found.base else tuple(found.added)
         remaining = Remaining.of(suspect.linearisation, where, beside) if outside else None
         if not outside:  # else nothing says of any model that it is right

@@ -23,7 +23,7 @@ from .search_state import SearchResult
 from .uncertainty import Known
 from .unseen import TriedOut
 from .verdict import MISSING, OUTSIDE, UNDECIDED, Verdict
-from .whereabouts import Whereabouts
+from .whereabouts import NOT_KNOWN, Whereabouts
 from .worst_segments import worst_segments
 
 _NEAREST = 3
@@ -136,6 +136,7 @@ def document(
         "unexplained_share": result.unexplained_share,
         "nonparametric_curves": [_curve(c) for c in where.curves],
         "unknown_inputs": [vars(u) for u in where.inputs],
+        "periodic_inputs": [vars(p) for p in where.sines],
         "nearest_effects": [r.name for r in final.refits[:_NEAREST]] if outside else [],
         "proposed_effect": None,
         "balances": [],
@@ -165,7 +166,7 @@ def added_document(
 ) -> dict[str, Any]:
     """The document of one effect added on request: the same keys, as far as they apply."""
     (name,) = result.added
-    whole = document(result, Verdict(MISSING, [name], {}, {}), known, Whereabouts(), tested)
+    whole = document(result, Verdict(MISSING, [name], {}, {}), known, NOT_KNOWN, tested)
     before, after = (number["validation"] for number in (whole["residual"]["before"], whole["residual"]["after"]))
     text = f"With {name} the residual on validation data goes from {before:.4g} to {after:.4g} × noise"
     whole |= heading("add", 2)
@@ -178,8 +179,8 @@ def added_document(
         ]),
     }
     del whole["verdict"]["probability"]
-    unused = ("explanations", "competing_models", "nonparametric_curves", "unknown_inputs", "nearest_effects",
-              "proposed_effect", "balances")  # fmt: skip
+    unused = ("explanations", "competing_models", "nonparametric_curves", "unknown_inputs", "periodic_inputs",
+              "nearest_effects", "proposed_effect", "balances")  # fmt: skip
     return {k: v for k, v in whole.items() if k not in unused}
 
 

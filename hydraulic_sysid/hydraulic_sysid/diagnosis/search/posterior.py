@@ -59,9 +59,10 @@ def explanations(result: SearchResult, verdict: Verdict, criteria: Criteria = CR
         return []
     unknown = probability_of_unknown(result.before_laws, final, criteria)
     if verdict.kind == OUTSIDE:
-        # Not by what is left alone: a drift, a law bent to its limits. What is said is no less probable than all else.
-        by_drift = decisive_drift(result) is not None
-        unknown = max(unknown, criteria.odds / (1.0 + criteria.odds) if by_drift else 0.5)
+        # Not by what is left alone: a drift, a sine, a law bent to its limits. What is said is no less probable than
+        # all else.
+        by_time = verdict.periodic or decisive_drift(result) is not None
+        unknown = max(unknown, criteria.odds / (1.0 + criteria.odds) if by_time else 0.5)
     elif verdict.kind in (MISSING, INDISTINGUISHABLE):
         unknown = min(unknown, 0.5)
     known = _known(result, verdict)

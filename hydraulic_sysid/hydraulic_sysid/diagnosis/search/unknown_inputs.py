@@ -41,19 +41,19 @@ def unknown_inputs(at: Linearisation, say: Callable[[str], None]) -> list[Unknow
     """At every place of the plant, the one that would explain most first."""
     part, _ = at.sample(CRITERIA.enough_to_score)
     say("where an addition of any course may act")
-    over_time = [place for place in places(part) if place.variable == "time"]
+    where = over_time(part)
     found = list[UnknownInput]()
     for knots in KNOTS:
         if found and _alone(found):
             break
-        shares = [_share(part, place, knots) for place in over_time]
+        shares = [_share(part, place, knots) for place in where]
         if part.split.channels == ["position"]:
             # Its reading explains whatever it reads, and so no more than what explains most else.
-            most = max((u for p, u in zip(over_time, shares, strict=True) if p.effect.slot != READS), default=0.0)
+            most = max((u for p, u in zip(where, shares, strict=True) if p.effect.slot != READS), default=0.0)
             shares = [min(u, most) for u in shares]
         found = [
             UnknownInput(p.effect.name, subsystem(p.effect), p.effect.summary, share)
-            for p, share in zip(over_time, shares, strict=True)
+            for p, share in zip(where, shares, strict=True)
         ]
         found.sort(key=lambda u: -u.share)
     return found
@@ -66,25 +66,61 @@ def _alone(found: Sequence[UnknownInput]) -> bool:
     return first.share > CRITERIA.nearly and others < CRITERIA.nearly * first.share
 
 
+@dataclass(frozen=True)
+class Courses:
+    """Hat functions over the time at a ``place``, ``width`` [s] apart, that begin again every ``period`` [s].
+
+    ``columns``: per record what the height of each (K), of the default size, changes of the residuals (S, m, K) beyond
+    what initial states do.
+    """
+
+    place: Place
+    width: float
+    period: float
+    columns: Sequence[Array]
+
+    @classmethod
+    def of(cls, at: Linearisation, place: Place, knots: int) -> Courses | None:
+        """So many in the length of a segment; None where the plant does not run with them."""
+        name, length = place.effect.name, longest_segment(at)
+        width = length / knots
+        period = length + 2.0 * width  # more than a segment, which so sees every hat once
+        courses = {"over": float(place.number), "width": width, "period": period, "centre": 0.0}
+        hats = [courses | {"centre": k * width, "height": place.height.default} for k in range(knots + 3)]
+        plants = [
+            place.plant.with_parameters({f"{name}.{k}": v for k, v in hat.items()})
+            for hat in (courses | {"height": 0.0}, *hats)
+        ]
+        try:
+            changed = at.changes(plants)
+        except SimulationError:
+            return None
+        return cls(place, width, period, at.point.beyond([c[..., 1:] - c[..., :1] for c in changed]))
+
+    def times(self, begun: Array) -> Array:
+        """When (S, K) [s] each of them is highest in segments that have ``begun`` (S,) then."""
+        first = begun[:, None] - self.width
+        return first + (self.width * np.arange(self.columns[0].shape[-1]) - first) % self.period
+
+
+def longest_segment(at: Linearisation) -> float:
+    """In seconds."""
+    return max(s.samples * s.record.dt for s in at.split.segments)
+
+
+def over_time(at: Linearisation) -> list[Place]:
+    """The places of the plant where something of any course may act."""
+    return [place for place in places(at) if place.variable == "time"]
+
+
 def _share(at: Linearisation, place: Place, knots: int) -> float:
     """0 where the plant does not run with it."""
-    name, length = place.effect.name, max(s.samples * s.record.dt for s in at.split.segments)
-    width = length / knots
-    # It begins again after more than a segment, which so sees every hat once.
-    courses = {"over": float(place.number), "width": width, "period": length + 2.0 * width, "centre": 0.0}
-    hats = [courses | {"centre": k * width, "height": place.height.default} for k in range(knots + 3)]
-    plants = [
-        place.plant.with_parameters({f"{name}.{k}": v for k, v in hat.items()})
-        for hat in (courses | {"height": 0.0}, *hats)
-    ]
-    try:
-        changed = at.changes(plants)
-    except SimulationError:
+    courses = Courses.of(at, place, knots)
+    if courses is None:
         return 0.0
-    own = at.point.beyond([c[..., 1:] - c[..., :1] for c in changed])
     information = np.diag(at.parameters.prior_information + anywhere_allowed(at.parameters))
     scores, left, freedom = list[Array](), 0.0, 0
-    for columns, residual, courses_here in zip(at.beyond, at.residual, own, strict=True):
+    for columns, residual, courses_here in zip(at.beyond, at.residual, courses.columns, strict=True):
         basis = _basis(courses_here)
         freedom += int(np.count_nonzero(basis.any(axis=1)))
         rest = _without(basis, residual[..., None])

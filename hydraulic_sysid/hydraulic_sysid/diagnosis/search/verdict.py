@@ -27,7 +27,7 @@ from .remainder import Remainder, Spikes, immaterial
 from .search_state import SearchResult, Together
 from .set_aside import DIFFERENT, FAR_OFF, SATURATED, SetAside
 from .unknown_law import probability_of_unknown
-from .whereabouts import Whereabouts, nowhere
+from .whereabouts import NOT_KNOWN, Whereabouts, nowhere
 from .whiteness import Whiteness
 
 MISSING = "missing"
@@ -50,13 +50,14 @@ class Verdict:
     """What a search says: its ``kind``, and the effects ``added``.
 
     Per effect added the ``competing`` models, and the ``family`` of effects that these channels cannot distinguish from
-    it, however well one of them fits.
+    it, however well one of them fits. ``periodic``: whether what is left goes on whatever the drive does.
     """
 
     kind: str
     added: Sequence[str]
     competing: Mapping[str, Sequence[CompetingModel]]
     family: Mapping[str, Sequence[str]]
+    periodic: bool = False
 
     def indistinguishable_from(self, name: str) -> list[str]:
         """By the errors, or by the channels."""
@@ -93,11 +94,11 @@ def judge(result: SearchResult) -> Verdict:
     return reviewed(Verdict(COMPLETE, result.added, competing, family), result)
 
 
-def reviewed(verdict: Verdict, result: SearchResult, curves: Sequence[NonparametricCurve] = ()) -> Verdict:
-    """The verdict with its kind; ``curves``: what any law may explain of what is left, where that is known."""
+def reviewed(verdict: Verdict, result: SearchResult, where: Whereabouts = NOT_KNOWN) -> Verdict:
+    """The verdict with its kind; ``where``: what anything may explain of what is left, as far as that is known."""
     tied = any(verdict.indistinguishable_from(name) for name in verdict.added)
     tied = tied or bool(result.faults_instead or result.together_instead.faults)
-    return replace(verdict, kind=kind_of(result, tied, curves))
+    return replace(verdict, kind=kind_of(result, tied, where), periodic=goes_on(result, where))
 
 
 def alternatives(result: SearchResult, verdict: Verdict) -> dict[str, Model]:
@@ -131,17 +132,18 @@ def families(model: Model, added: Sequence[str], channels: Sequence[str]) -> dic
     return found
 
 
-def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurve] = ()) -> str:
+def kind_of(result: SearchResult, tied: bool, where: Whereabouts = NOT_KNOWN) -> str:
     """The verdict's kind; ``tied``: whether anything may be in the place of what was added.
 
-    Where effects explain the most and none of the ``curves`` a part of the rest, that is how far their laws are off
-    those of the bench (the touch of a backlash, the start of a cushion): nothing else is missing. Where far more than
-    noise is left, and a curve explains the most of it, something else is; so it is where a law that the library lacks
-    is more probable by what is left, unless it is known that none of the curves explains a part of that.
+    Where effects explain the most and no curve a part of the rest, that is how far their laws are off those of the
+    bench (the touch of a backlash, the start of a cushion): nothing else is missing. Where far more than noise is left,
+    and a curve explains the most of it, something else is; so it is where a law that the library lacks is more probable
+    by what is left, unless it is known that no curve explains a part of that, and where the most of it is periodic of
+    itself.
     """
     if result.stopped:
         return UNDECIDED
-    if decisive_drift(result) is not None:
+    if decisive_drift(result) is not None or goes_on(result, where):
         return OUTSIDE
     final = result.final.misfit
     little = final.little or immaterial(final, result.remainders) or result.by_force is not None
@@ -154,9 +156,9 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
         return OUTSIDE
     if little:
         return INDISTINGUISHABLE if tied else MISSING
-    no_law = nowhere(curves)
+    no_law = nowhere(where.curves)
     details = final.variance < CRITERIA.small or no_law
-    if final.usual > CRITERIA.right_law and any(c.share > CRITERIA.most_of for c in curves):
+    if final.usual > CRITERIA.right_law and any(c.share > CRITERIA.most_of for c in where.curves):
         return OUTSIDE
     allowed = CRITERIA.small_unexplained if details else CRITERIA.details
     if unexplained_share(result.base.misfit, final) > allowed and final.variance > 1.0 + 2.0 * CRITERIA.noise_missed:
@@ -164,6 +166,11 @@ def kind_of(result: SearchResult, tied: bool, curves: Sequence[NonparametricCurv
     if probability_of_unknown(result.before_laws, final) > 0.5 and not no_law:
         return OUTSIDE
     return INDISTINGUISHABLE if tied else MISSING
+
+
+def goes_on(result: SearchResult, where: Whereabouts) -> bool:
+    """Whether the most of what is left is periodic of itself; a drive that is not known may be."""
+    return where.sine is not None and not (result.final.misfit.little or drive_unknown(result))
 
 
 def faulty(result: SearchResult) -> bool:

@@ -1,14 +1,18 @@
-"""Where what no effect explains comes from: curves over a variable, bounded by what an addition of any course would."""
+"""Where what no effect explains comes from: curves over a variable, bounded by what an addition of any course would.
+
+Or a sine that goes on whatever the drive does.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hydraulic_sysid.data.display import listed
+from hydraulic_sysid.data.display import listed, quantity
 
 from .criteria import CRITERIA
 from .nonparametric_curves import NonparametricCurve
+from .periodic_inputs import PeriodicInput
 from .unknown_inputs import UnknownInput
 
 READING = "sensor"  # subsystem of the reading of the position
@@ -21,7 +25,7 @@ def nowhere(curves: Sequence[NonparametricCurve]) -> bool:
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """``curves`` and unknown ``inputs``, each the best first; of plants that take none of the latter those are empty.
+    """``curves``, unknown ``inputs`` and ``sines``, each the best first; empty of plants that take none of them.
 
     A curve is the best where no other explains more at a place at which something may explain nearly the most; of those
     that explain nearly as much it is that at whose place more may be explained. So it is of those that explain half as
@@ -30,11 +34,17 @@ class Whereabouts:
 
     curves: Sequence[NonparametricCurve] = ()
     inputs: Sequence[UnknownInput] = ()
+    sines: Sequence[PeriodicInput] = ()
 
     @classmethod
-    def of(cls, curves: Sequence[NonparametricCurve], inputs: Sequence[UnknownInput]) -> Whereabouts:
+    def of(
+        cls,
+        curves: Sequence[NonparametricCurve],
+        inputs: Sequence[UnknownInput],
+        sines: Sequence[PeriodicInput] = (),
+    ) -> Whereabouts:
         """With the curves in order, which come as they explain."""
-        bare = cls(curves, inputs)
+        bare = cls(curves, inputs, sines)
         possible = [c for c in curves if bare.possible(c)]
         if not possible:
             return bare
@@ -42,7 +52,13 @@ class Whereabouts:
         least = (CRITERIA.nearly if most > CRITERIA.most_of else CRITERIA.most_of) * most
         near = [c for c in possible if c.share >= least]
         best = max(near, key=lambda c: (round(bare.bound(c.place), 2), c.share))
-        return cls(sorted(curves, key=lambda c: (c is not best, not bare.possible(c))), inputs)
+        return cls(sorted(curves, key=lambda c: (c is not best, not bare.possible(c))), inputs, sines)
+
+    @property
+    def sine(self) -> PeriodicInput | None:
+        """What is periodic of itself: it explains the most, and more than any curve."""
+        curve = max((c.share for c in self.curves), default=0.0)
+        return next((s for s in self.sines[:1] if s.share > max(CRITERIA.most_of, curve)), None)
 
     def bound(self, place: str) -> float:
         """The share that anything at a place may explain."""
@@ -71,6 +87,8 @@ class Whereabouts:
         What acts in a plant reaches the position through its mass and its oil, so that a slow course takes up a part of
         it: what neither that nor a curve explains is in how the position is read.
         """
+        if self.sine is not None:
+            return self.sine.subsystem
         if nowhere(self.curves):
             return self.inputs[0].subsystem if self.clear else READING
         return self.curves[0].subsystem if self.curves else None
@@ -88,6 +106,8 @@ class Whereabouts:
 
         :param more: " more", where something else was said before
         """
+        if self.sine is not None:
+            return f"It looks{more} like {self._sines(self.sine)}."
         if nowhere(self.curves):
             none = f"No curve at any place of the plant would explain {100 * CRITERIA.details:.0f} % of it"
             if not self.clear:
@@ -104,10 +124,21 @@ class Whereabouts:
         others = [f"{_curve(c)} ({100 * c.share:.0f} %)" for c in self.as_likely(best)]
         return f"{said}; nearly as much: {listed(others)}." if others else f"{said}."
 
+    def _sines(self, best: PeriodicInput) -> str:
+        near = [s for s in self.sines if s.subsystem != best.subsystem and s.share > CRITERIA.nearly * best.share]
+        others = [f"{_course(s)} ({100 * s.share:.0f} %)" for s in near]
+        also = f"; nearly as much: {listed(others)}" if others else ""
+        by = f"at {best.frequency:.3g} Hz by about {quantity(best.amplitude, best.unit, 2)}"
+        much = f"which would explain {100 * best.share:.0f} % of it"
+        return f"{_course(best)} that swings {by}, whatever the drive does, {much}{also}"
+
+
+NOT_KNOWN = Whereabouts()
+
 
 def _curve(found: NonparametricCurve) -> str:
     return f"{found.summary} over {found.variable.replace('_', ' ')}"
 
 
-def _course(found: UnknownInput) -> str:
+def _course(found: UnknownInput | PeriodicInput) -> str:
     return found.summary.removesuffix(" of any shape")
