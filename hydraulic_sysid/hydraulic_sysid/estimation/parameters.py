@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sim.effect import Parameter
 from hydraulic_sim.model import Model
 from hydraulic_sim.typical import typical
 
@@ -33,6 +34,18 @@ def scale(model: Model, key: str) -> float:
     return max(abs(model.value(key)), usual) or 0.01 * (high - low)
 
 
+def turns(parameter: Parameter) -> bool:
+    """Whether it is an angle that may go all the way round."""
+    return parameter.unit == "rad" and parameter.bounds[1] - parameter.bounds[0] >= _TURN
+
+
+def clocked(model: Model, key: str) -> bool:
+    """Whether it is the frequency of what goes on by itself, with a phase beside it: what it is off adds up."""
+    owner = key.rpartition(".")[0]
+    beside = model.library[owner].parameters if owner else ()
+    return model.parameter(key).unit == "Hz" and any(turns(p) for p in beside)
+
+
 def bounded(model: Model) -> Model:
     """The model with bounds on free base parameters whose file gives none: half to twice their value.
 
@@ -52,6 +65,7 @@ class Parameters:
 
     What is known beforehand: normal priors around ``mean`` with ``std`` (P,), infinite where nothing is. An angle that
     may go all the way round has a ``period`` (P,), all others an infinite one: it goes on at the other bound.
+    ``turning`` (P,): by how much [rad/s] what goes on by itself turns with one more of a frequency `clocked`, else 0.
     """
 
     keys: tuple[str, ...]
@@ -62,6 +76,7 @@ class Parameters:
     mean: Array
     std: Array
     period: Array
+    turning: Array
 
     @classmethod
     def of(cls, model: Model, keys: Iterable[str], priors: Priors = NO_PRIORS) -> Parameters:
@@ -70,16 +85,17 @@ class Parameters:
         low, high = np.array([model.entry(k).bounds for k in keys], dtype=float).reshape(-1, 2).T
         values = np.array([model.value(k) for k in keys], dtype=float)
         mean, std = np.array([priors.get(k, (0.0, np.inf)) for k in keys], dtype=float).reshape(-1, 2).T
-        turns = [model.parameter(k).unit == "rad" and h - w >= _TURN for k, w, h in zip(keys, low, high, strict=True)]
+        whole = [turns(model.parameter(k)) and h - w >= _TURN for k, w, h in zip(keys, low, high, strict=True)]
         scales = np.array([scale(model, k) for k in keys], dtype=float)
-        return cls(keys, values, scales, low, high, mean, std, np.where(turns, _TURN, np.inf))
+        turning = np.array([_TURN if clocked(model, k) else 0.0 for k in keys], dtype=float)
+        return cls(keys, values, scales, low, high, mean, std, np.where(whole, _TURN, np.inf), turning)
 
     @classmethod
     def unbounded(cls, values: Array) -> Parameters:
         """Numbers that may be anything, of scale one."""
         infinite = np.full(values.size, np.inf)
         names = tuple(map(str, range(values.size)))
-        return cls(names, values, np.ones(values.size), -infinite, infinite, values, infinite, infinite)
+        return cls(names, values, np.ones(values.size), -infinite, infinite, values, infinite, infinite, 0.0 * values)
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -102,7 +118,7 @@ class Parameters:
 
     @property
     def _arrays(self) -> tuple[Array, ...]:
-        return self.values, self.scales, self.low, self.high, self.mean, self.std, self.period
+        return self.values, self.scales, self.low, self.high, self.mean, self.std, self.period, self.turning
 
     @property
     def prior_cost(self) -> float:

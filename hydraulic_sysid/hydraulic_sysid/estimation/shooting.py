@@ -28,6 +28,7 @@ _STIFFEST = 4.0  # times shorter than the plant's: steps that a fit does not fol
 _ANYWAY = 2.5e-4  # s … unless they are as long as that
 _STEP = 2e-3  # difference step of a parameter, of its value, …
 _LEAST_STEP = 0.1  # … or of so much of its scale
+_TURNED = 0.01  # rad, by which that of a frequency may turn what it drives at the end of a record
 _NEAR_STOP = 0.05  # of the stroke: what goes no nearer to an end of it stays clear of the stop
 _STATE_STEP = 0.5  # difference step of an initial state, of the noise of its channel
 _VELOCITY_STEP = 1e-3  # m/s
@@ -182,6 +183,8 @@ class Shooting:
         """
         values, scales = parameters.values, parameters.scales
         steps = _STEP * np.maximum(np.abs(values), _LEAST_STEP * scales)
+        longest = max(len(s.record) * s.record.dt for s in self.segments)
+        steps = np.minimum(steps, _TURNED / np.maximum(parameters.turning * longest, 1e-300))
         steps = np.where(values + steps <= parameters.high, steps, -steps)
         moved = zip(parameters.keys, (values + steps).tolist(), strict=True)
         plants = [plant.with_parameters({key: value}) for key, value in moved]

@@ -66,7 +66,7 @@ def not_identifiable(
 def with_laws_off(point: FitPoint) -> FitPoint:
     """The same point; the law of every parameter may be off by `LAW` of itself in each segment."""
     parameters = point.parameters
-    off = parameters.values / parameters.scales * LAW
+    off = np.where(parameters.turning > 0.0, 0.0, parameters.values / parameters.scales * LAW)
     segments = [
         replace(s, nuisance=c[:, : s.samples * len(s.channels)] * off)
         for s, c in zip(point.shooting.segments, point.columns, strict=True)

@@ -18,7 +18,7 @@ from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.estimation.errors import SegmentError
 from hydraulic_sysid.estimation.fit import Fit, FitPoint, FitSettings, fit_segments
 from hydraulic_sysid.estimation.known_starts import KnownStarts
-from hydraulic_sysid.estimation.parameters import Parameters, bounded
+from hydraulic_sysid.estimation.parameters import Parameters, bounded, clocked
 from hydraulic_sysid.estimation.refinement import ordinary, refined
 from hydraulic_sysid.estimation.segments import Segments, shorter
 
@@ -172,8 +172,9 @@ class Fitting:
         return state
 
     def _laws(self, model: Model) -> list[str]:
-        """Parameters that stand for a law: the free ones, not the numbers that a data sheet states."""
-        return [k for k in model.free_keys() if "." in k or self.given.entry(k).free]
+        """Parameters that stand for a law: the free ones, not the numbers that a data sheet states, nor a clock's."""
+        free = [k for k in model.free_keys() if "." in k or self.given.entry(k).free]
+        return [k for k in free if not clocked(model, k)]
 
     def better(self, before: SearchState, after: SearchState) -> bool:
         """Whether what a state explains more than another is more than chance; where little is left, by any noise.

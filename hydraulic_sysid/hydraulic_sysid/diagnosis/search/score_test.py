@@ -119,7 +119,8 @@ def _predict(at: Linearisation, model: Model, effect: Effect, group: list[Probe]
     reach = np.array([_reach(effect, p) for p in group])
     none, one = np.zeros(usable.size), np.ones(usable.size)
     low, high = reach.T
-    units = Parameters(tuple(p.moved for p in group), none, one, low, high, none, np.inf * one, np.inf * one)
+    unlimited = np.inf * one
+    units = Parameters(tuple(p.moved for p in group), none, one, low, high, none, unlimited, unlimited, none)
     change = bounded_step(normal, at.parameters + units)
     gain = normal.reduction(change) - at.own_reduction
     for p, amount in zip(group, change[own:].tolist(), strict=True):
