@@ -235,7 +235,21 @@ def test_what_effects_may_stand_for_follows_from_the_sensitivities(model: Model)
     found = StandIns.of(at, {k: times * model.value(k) for k, times in off.items()}, record_features(at))
     enough = CRITERIA.significant
     assert [found.for_number(key, enough)[:1] for key in off] == [["sensor_offset"]] * 2 + [["pressure_offset"], []]
-    assert ("dead_volume_a", "dead_volume_b") in found.sets(freedom=10.0)
+    volumes = ("dead_volume_a", "dead_volume_b")
+    assert volumes in found.sets(freedom=10.0) and list(found.for_set(volumes))[:1] == ["sensor_offset"]
+
+
+def test_one_effect_begins_where_it_does_what_two_numbers_do(model: Model) -> None:
+    """Walls that give way, for both dead volumes: C = ΔV/β, beyond which a resonance is not linear."""
+    wider = {key: model.value(key) + 1e-4 for key in ("dead_volume_a", "dead_volume_b")}
+    for key, value in wider.items():
+        model = model.with_entry(key, value=value, free=True, bounds=(0.5 * value, 2.0 * value))
+    fits = CandidateFits.of(model, [swept(model)], [], FitSettings(), lambda text: None)
+    at = Linearisation.of(model, fits.split)
+    found = StandIns.of(at, {key: value - 1e-4 for key, value in wider.items()}, record_features(at))
+    assert tuple(wider) in found.sets(freedom=10.0)
+    start = found.for_set(tuple(wider))["hose_compliance"]
+    assert start["capacity"] == pytest.approx(1e-4 / model.value("bulk_modulus"), rel=0.1)
 
 
 @pytest.mark.parametrize(

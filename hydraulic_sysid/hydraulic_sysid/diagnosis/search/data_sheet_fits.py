@@ -5,7 +5,7 @@ In the end only those numbers are others that the records contradict.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
@@ -13,6 +13,7 @@ from itertools import chain
 import numpy as np
 
 from hydraulic_sim.errors import SimulationError
+from hydraulic_sim.model import Model
 
 from .candidate_fits import CandidateFits
 from .candidates import candidates
@@ -25,6 +26,8 @@ from .spectral_lines import record_features
 from .stand_ins import StandIns
 from .uncertainty import parameter_errors
 from .worth import borrowed, nothing_gained
+
+NO_STARTS: Mapping[str, Mapping[str, float]] = {}
 
 
 class DataSheetFits(CandidateFits):
@@ -66,7 +69,7 @@ class DataSheetFits(CandidateFits):
         stand_ins = self.stand_ins(done, moved) if moved and (others or not found.added) else None
         tried = stand_ins.sets(done.misfit.freedom)[: CRITERIA.most_sets] if stand_ins is not None and others else []
         for keys in tried:
-            simpler = self.simpler(found, strict, done, moved, keys)
+            simpler = self.simpler(found, strict, done, moved, keys, stand_ins)
             if simpler is not None:
                 return simpler
         places = [self.standing_in(None if found.added else strict, done, d, moved, stand_ins) for d in moved]
@@ -90,7 +93,7 @@ class DataSheetFits(CandidateFits):
             ]
             shared = [tuple(d.key for d in moved if name in d.instead) for one in moved for name in one.instead]
             for keys in dict.fromkeys(shared):
-                simpler = None if keys in tried else self.simpler(found, strict, done, moved, keys)
+                simpler = None if keys in tried else self.simpler(found, strict, done, moved, keys, stand_ins)
                 if simpler is not None:
                     return simpler
         misfits = found.misfits
@@ -110,13 +113,15 @@ class DataSheetFits(CandidateFits):
         done: SearchState,
         moved: Sequence[Deviation],
         keys: Sequence[str],
+        stand_ins: StandIns | None,
     ) -> SearchResult | None:
         """With the one effect that does what several of the numbers ``moved``, those of ``keys``, do, as BIC has it."""
         taken = [d for d in moved if d.key in keys]
         if len(taken) < 2:
             return None
         try:
-            without, states = self.in_place_of(None if found.added else strict, done, taken, moved)
+            starts = {} if stand_ins is None else stand_ins.for_set(keys)
+            without, states = self.in_place_of(None if found.added else strict, done, taken, moved, starts=starts)
         except SimulationError:  # with these numbers back the effects that were found do not run
             return None
         best = min(states, key=lambda s: s.misfit.total, default=done)
@@ -199,36 +204,47 @@ class DataSheetFits(CandidateFits):
         taken: Sequence[Deviation],
         moved: Sequence[Deviation],
         names: Sequence[str] = (),
+        starts: Mapping[str, Mapping[str, float]] = NO_STARTS,
     ) -> tuple[SearchState, list[SearchState]]:
         """The state with numbers ``taken`` back, and with effects that explain no less than they do.
 
         ``done``: with all numbers ``moved``; ``strict``: with none, where that is known; ``names``: of the effects, the
-        likeliest first (default: those that promise most).
+        likeliest first (default: those that promise most); ``starts``: of some, where a fit beside ``done`` begins.
         """
         others = [d.key for d in moved if d not in taken]
+
+        def unbent(name: str, values: Mapping[str, float]) -> Model:
+            """Without the numbers the other values were bent to imitate them."""
+            return restored(done.model, self.given, others).with_effect(name, values)
+
         back = self.with_moved(done, others) if others or strict is None else strict
         likeliest = [e for e in candidates(back.model) if e.name in names[: CRITERIA.most_finished]]
         without = self.tried_with(back, likeliest) if likeliest else self.explore(back, CRITERIA.later_refits)
         promising = without.misfit.total - CRITERIA.promised * (without.misfit.total - done.misfit.total)
-        found, near = [], [r for r in without.refits if r.misfit.total < promising][: CRITERIA.most_finished]
-        most = (1.0 + CRITERIA.worse_look) * self.left_on_few(done) if near else 0.0
-        for r in near:
-            own = {p.name: r.refit.model.value(f"{r.name}.{p.name}") for p in r.refit.model.library[r.name].parameters}
-            self.say(f"{r.name} in the place of {' and '.join(d.key for d in taken) or 'a fault'}")
-            # Without the numbers the other values were bent to imitate them.
-            unbent = restored(done.model, self.given, others).with_effect(r.name, own)
+        near = [r for r in without.refits if r.misfit.total < promising][: CRITERIA.most_finished]
+        tried = {r.name: [r.refit.model, unbent(r.name, _own(r.refit.model, r.name))] for r in near}
+        for name, values in list(starts.items())[: CRITERIA.most_finished]:
+            tried.setdefault(name, []).append(unbent(name, values))
+        most, found = (1.0 + CRITERIA.worse_look) * self.left_on_few(done) if tried else 0.0, list[SearchState]()
+        for name, models in tried.items():
+            self.say(f"{name} in the place of {' and '.join(d.key for d in taken) or 'a fault'}")
             looks = []
-            for model in (r.refit.model, unbent):
+            for model in models:
                 with suppress(SimulationError):
                     looks.append((self.looked_at(model), model))
-            left, model = min(looks, key=lambda look: look[0], default=(np.inf, unbent))
+            left, model = min(looks, key=lambda look: look[0], default=(np.inf, done.model))
             if left > most:
                 continue
             with suppress(SimulationError):
                 reached = self.state(model, self._last)
-                if not (worse(reached.misfit, done.misfit) or borrowed(without, reached, r.name)):
+                if not (worse(reached.misfit, done.misfit) or borrowed(without, reached, name)):
                     found.append(reached)
         return without, found
+
+
+def _own(model: Model, name: str) -> dict[str, float]:
+    """An effect's parameters [SI] by their names."""
+    return {p.name: model.value(f"{name}.{p.name}") for p in model.library[name].parameters}
 
 
 def _names(states: Sequence[SearchState], before: SearchState) -> tuple[str, ...]:

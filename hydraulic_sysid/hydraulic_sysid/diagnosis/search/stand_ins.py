@@ -21,9 +21,37 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 from hydraulic_sysid.estimation.parallel import results
 
-from .candidates import RecordFeatures, candidates, observed, probes
+from .candidates import Probe, RecordFeatures, between, candidates, observed, probes
 from .criteria import CRITERIA
 from .linearisation import Linearisation
+
+_TRIED = 0.02  # of an effect's usual size: what goes through a resonance is linear no further
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A fit with what an effect brings in one of its shapes, in units of its usual size: its ``normal`` equations.
+
+    ``probes``: at which that was looked at.
+    """
+
+    effect: Effect
+    probes: Sequence[Probe]
+    normal: NormalEquations
+
+    def start(self, off: Array, held: tuple[int, ...]) -> dict[str, float]:
+        """The effect's parameters [SI, by name] where it does the most of what holding parameters costs."""
+        amounts = _following(self.normal, off, held)[len(off) - len(held) :].tolist()
+        moved = {p.moved: (p, amount) for p, amount in zip(self.probes, amounts, strict=True)}
+        values = dict[str, float]()
+        for parameter in self.effect.parameters:
+            key = f"{self.effect.name}.{parameter.name}"
+            value = self.probes[0].values.get(key, parameter.default)
+            if key in moved:
+                probe, amount = moved[key]
+                value = between(probe.null, probe.values[key], amount / _TRIED, parameter.default)
+            values[parameter.name] = min(max(value, parameter.bounds[0]), parameter.bounds[1])
+        return values
 
 
 @dataclass(frozen=True)
@@ -31,15 +59,15 @@ class StandIns:
     """Effects beside a fit in which numbers of the data sheet are others than the model file says.
 
     ``off`` (P,): by how much the file's values are, of the parameters' scales; ``places``: where these numbers are
-    among them; ``normal``: of the fit, and ``beside``: the same with what each effect brings, in every shape that is
-    tried; ``share``: of the sum of squares that was looked at.
+    among them; ``normal``: of the fit, and ``beside``: what each effect brings, in every shape that is tried;
+    ``share``: of the sum of squares that was looked at.
     """
 
     keys: tuple[str, ...]
     places: tuple[int, ...]
     off: Array
     normal: NormalEquations
-    beside: Mapping[str, Sequence[NormalEquations]]
+    beside: Mapping[str, Sequence[Beside]]
     share: float
 
     @classmethod
@@ -60,7 +88,7 @@ class StandIns:
         """
         sizes = range(2, len(self.places) + 1)
         sets = [held for size in sizes for held in combinations(self.places, size)]
-        nothing = {held: CRITERIA.rough * self._alone(held) for held in sets}
+        nothing = {held: self._nothing(held) for held in sets}
         best: dict[tuple[str, ...], float] = {}
         for name in self.beside:
             cost = {held: self._cost(name, held) for held in sets if len(held) > self._brought(name)}
@@ -70,6 +98,14 @@ class StandIns:
                 keys = tuple(self.keys[i] for i in chosen)
                 best[keys] = min(best.get(keys, np.inf), likely[chosen])
         return sorted(best, key=lambda keys: best[keys])
+
+    def for_set(self, keys: Sequence[str]) -> dict[str, dict[str, float]]:
+        """Effects that do what all of these numbers do → where a fit with them begins; the likeliest first."""
+        held = tuple(self.keys.index(key) for key in keys)
+        most = self._nothing(held)
+        cost = {name: self._cost(name, held) for name in self.beside}
+        likely = sorted((name for name in cost if cost[name] < most), key=lambda name: cost[name])
+        return {name: self._best(name, held).start(self.off, held) for name in likely}
 
     def for_number(self, key: str, enough: float) -> list[str]:
         """Effects beside which it costs hardly anything to hold a number as it was, or half and less than ``enough``.
@@ -85,23 +121,38 @@ class StandIns:
         """Sum of squares that it costs to hold a number as it was, without any effect."""
         return self._alone((self.keys.index(key),))
 
+    def _nothing(self, held: tuple[int, ...]) -> float:
+        """Up to which cost an effect is fitted, which decides: what several numbers do together is far off."""
+        return CRITERIA.details * self._alone(held)
+
     def _alone(self, held: tuple[int, ...]) -> float:
         return _cost_of_holding(self.normal, self.off, held) / self.share
 
     def _brought(self, name: str) -> int:
-        return min(len(normal.information) for normal in self.beside[name]) - len(self.off)
+        return min(len(b.probes) for b in self.beside[name])
 
     def _cost(self, name: str, held: tuple[int, ...]) -> float:
-        return min(_cost_of_holding(normal, self.off, held) for normal in self.beside[name]) / self.share
+        return _cost_of_holding(self._best(name, held).normal, self.off, held) / self.share
+
+    def _best(self, name: str, held: tuple[int, ...]) -> Beside:
+        return min(self.beside[name], key=lambda b: _cost_of_holding(b.normal, self.off, held))
 
 
-def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> list[NormalEquations]:
-    """The normal equations with what an effect brings, at the probes of each of its shapes that run."""
-    model, found = at.model.with_effect(effect.name), list[NormalEquations]()
-    for group in probes(effect, features):
+def _beside(at: Linearisation, effect: Effect, features: RecordFeatures) -> list[Beside]:
+    """With what an effect brings, at the probes of each of its shapes that run."""
+    model, found = at.model.with_effect(effect.name), list[Beside]()
+    for group in probes(effect, features, (_TRIED,)):
         with suppress(SimulationError):
-            found.append(at.bordered(at.changes([Plant.for_fits(model.with_values(p.values)) for p in group])))
+            changes = at.changes([Plant.for_fits(model.with_values(p.values)) for p in group])
+            found.append(Beside(effect, group, at.bordered([c / _TRIED for c in changes])))
     return found
+
+
+def _following(normal: NormalEquations, off: Array, held: tuple[int, ...]) -> Array:
+    """Where all other parameters go, in their order, when those ``held`` move by ``off`` (P,)."""
+    others = np.setdiff1d(np.arange(len(normal.information)), held)
+    own, cross = normal.information[np.ix_(others, others)], normal.information[np.ix_(others, np.array(held))]
+    return np.asarray(-np.linalg.pinv(own, rcond=1e-12, hermitian=True) @ cross @ off[list(held)])
 
 
 def _cost_of_holding(normal: NormalEquations, off: Array, held: tuple[int, ...]) -> float:
