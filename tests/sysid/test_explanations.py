@@ -398,6 +398,14 @@ def test_of_very_long_records_blocks_are_left_out(model: Model) -> None:
     assert time.size - segments.first[-1] <= np.diff(segments.first).max()  # evenly, up to the end
 
 
+def test_what_goes_furthest_is_not_left_out(model: Model) -> None:
+    """A cushion acts where the piston goes once in a record."""
+    time = DT * np.arange(100_000)
+    channels = {c: np.sin(time) + np.where(np.abs(time - 39.3) < 0.5, 0.5, 0.0) for c in NOISE}
+    used = split([Record.sampled("long", DT, channels | {"drive": np.sin(time)})], (), model, 0.5).segments[0]
+    assert used.measured[..., 0].max() > 1.3
+
+
 @pytest.mark.parametrize("names", [("position",), tuple(NOISE)], ids=["position", "pressures, too"])
 @pytest.mark.parametrize("dt", [1e-3, 4e-3])
 def test_for_a_quick_answer_a_few_seconds_do_that_hold_enough(model: Model, dt: float, names: tuple[str, ...]) -> None:

@@ -33,6 +33,8 @@ MOST_VALUES = 80_000  # measured values of all segments, spread: 27 s of three c
 QUICK_VALUES = 24_000  # … and for an answer in seconds; what is small is missed, …
 QUICK_SECONDS = 8.0  # … and of fewer channels or at lower rates so many seconds, over which a fit takes as long, …
 QUICK_LEAST = 6_000  # … that hold so many values
+BEYOND = 0.1  # of a range that was taken: what goes further is taken, too, …
+MOST_BEYOND = 4  # … in so many blocks
 TEST_VALUES = 20_000  # measured values of all segments for a test, spread over what is left to test on
 DENSE = 500  # samples of a segment that do, if the model's resonance has …
 PER_PERIOD = 5.0  # … so many samples in a period
@@ -187,15 +189,47 @@ def _reduced(left_out: Mask, factor: int, count: int) -> Mask:
 
 
 def _thinned(segments: list[Segments], quick: bool) -> tuple[list[Segments], list[int], list[Segments]]:
-    """One block in so many of all records, if there is more than is used, of which records they are, and the rest."""
+    """One block in so many of all records, if there is more than is used, of which records they are, and the rest.
+
+    And the few that go beyond those, unless it is to be ``quick``: a cushion or a limit may act nowhere else.
+    """
     values = sum(s.measured.size for s in segments)
     seconds = sum(len(s) * s.samples * s.record.dt for s in segments)
     times = max(values / QUICK_VALUES, min(seconds / QUICK_SECONDS, values // QUICK_LEAST))
     every = ceil(times if quick else values / MOST_VALUES)
-    chosen = [block % every == 0 for block in _blocks(segments)]
+    blocks = _blocks(segments)
+    taken = np.concatenate(blocks) % every == 0
+    if not (quick or taken.all()):
+        taken = _with_extremes(taken, np.concatenate(blocks), _ranges(segments))
+    chosen = np.split(taken, np.cumsum([len(s) for s in segments])[:-1])
     kept = [s.subset(c) if every > 1 else s for s, c in zip(segments, chosen, strict=True) if c.any()]
     left = [s.subset(~c) for s, c in zip(segments, chosen, strict=True) if not c.all()]
     return kept, [i for i, c in enumerate(chosen) if c.any()], left
+
+
+def _ranges(segments: Sequence[Segments]) -> Array:
+    """(S, 5, 2) lowest and highest position, velocity, pressures and drive in each segment, NaN where not measured."""
+    found = []
+    for s in segments:
+        inside = s.first[:, None] + np.arange(s.samples)
+        every = np.column_stack((s.smoothed, s.record["drive"]))[inside]
+        found.append(np.stack((every.min(axis=1), every.max(axis=1)), axis=-1))
+    return np.concatenate(found)
+
+
+def _with_extremes(taken: Mask, block: Index, ranges: Array) -> Mask:
+    """The segments (S,) ``taken`` and those of the blocks that go furthest beyond what these see."""
+    taken, lowest, highest = taken.copy(), ranges[..., 0], ranges[..., 1]
+    for _ in range(MOST_BEYOND):
+        low = np.min(lowest, axis=0, where=taken[:, None] & np.isfinite(lowest), initial=np.inf)
+        high = np.max(highest, axis=0, where=taken[:, None] & np.isfinite(highest), initial=-np.inf)
+        seen = np.isfinite(ranges).all(axis=-1) & (high > low)
+        beyond = np.where(seen, np.maximum(low - lowest, highest - high) / np.where(high > low, high - low, 1.0), 0.0)
+        furthest = np.where(taken, 0.0, beyond.max(axis=1))
+        if furthest.max() <= BEYOND:
+            break
+        taken |= block == block[np.argmax(furthest)]
+    return taken
 
 
 def _spread(segments: list[Segments], most: int) -> list[Segments]:
