@@ -219,7 +219,8 @@ def test_no_curve_does_what_a_bounded_parameter_could_undo(low: float, high: flo
     Between its bounds it has a variance of a twelfth of their distance squared.
     """
     one = np.ones(1)
-    parameters = Parameters(("level",), one, one, low * one, high * one, 0.0 * one, np.inf * one, np.inf * one)
+    none, unlimited = 0.0 * one, np.inf * one
+    parameters = Parameters(("level",), one, one, low * one, high * one, none, unlimited, unlimited, none)
     every = np.full((4, 4), 1e9)  # of the parameter and, alike, of three heights together
     normal = NormalEquations(every, (np.zeros((1, 4)),))
     at: Any = SimpleNamespace(changes=lambda plants: [], bordered=lambda columns: normal, parameters=parameters)
