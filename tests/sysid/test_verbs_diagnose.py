@@ -143,6 +143,8 @@ PROPOSED = {
     }
 }
 SHOWN = {"summary": "a force of any shape", "unit": "N", "lag": 0.0157, "knots": [-0.1, 0.1], "value": [0.0, 5.0]}
+SWING = {"place": "unknown_force", "subsystem": "force", "frequency": 1.85, "amplitude": 555.0, "share": 0.96}
+PERIODIC = {"periodic_inputs": [SWING | {"summary": "a force of any shape", "unit": "N"}]}
 PROPOSED_LAW = {"proposed_effect": PROPOSED["proposed_effect"] | SHOWN}
 
 
@@ -164,6 +166,11 @@ PROPOSED_LAW = {"proposed_effect": PROPOSED["proposed_effect"] | SHOWN}
             OUTSIDE | PROPOSED_LAW,
             "proposed; plant: a force of any shape over the position; 15.7\u00a0ms late; To first order",
         ),
+        (
+            "outside the library",
+            OUTSIDE | PERIODIC,
+            "Look for what runs at 1.85\u00a0Hz beside the bench; What swings of itself; 0.555\u00a0kN; 96.0\u00a0%",
+        ),
         ("indistinguishable", {}, "The error falls; next_experiment --diagnosis"),
         ("indistinguishable", {"recording": GAIN}, "Look whether pressure_a reads 5 % too much: calibrate it."),
         ("complete", {"competing_models": {}, "balances": []}, "Measured and simulated; Nothing has to be added"),
@@ -179,7 +186,7 @@ PROPOSED_LAW = {"proposed_effect": PROPOSED["proposed_effect"] | SHOWN}
 )
 def test_the_page_of_every_verdict_says_what_to_do(run: Path, kind: str, change: dict[str, Any], words: str) -> None:
     document = json.loads((run / "diagnose.json").read_text())
-    document["verdict"]["kind"] = kind
+    document["verdict"] |= {"kind": kind, "periodic": "periodic_inputs" in change}
     if kind == "complete":
         document["residual"]["after_each_effect"] = []
     page = render([{**document, **change}])

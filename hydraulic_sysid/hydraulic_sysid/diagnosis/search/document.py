@@ -79,6 +79,7 @@ def document(
             "level": "off" if outside else "explained" if explained and verdict.kind != UNDECIDED else "close",
             "effects": verdict.possible,
             "subsystem": verdicts.place(result, verdict, where),
+            "periodic": where.sine is not None,
             "probability": posterior.probability(compared),
             "text": text + verdicts.warning(verdict.possible, imitations),
             "imitated": imitations,
@@ -178,7 +179,7 @@ def added_document(
             *verdicts.force_sentences(result, others=False),
         ]),
     }
-    del whole["verdict"]["probability"]
+    del whole["verdict"]["probability"], whole["verdict"]["periodic"]
     unused = ("explanations", "competing_models", "nonparametric_curves", "unknown_inputs", "periodic_inputs",
               "nearest_effects", "proposed_effect", "balances")  # fmt: skip
     return {k: v for k, v in whole.items() if k not in unused}
