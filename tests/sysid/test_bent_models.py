@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, ClassVar, cast
@@ -10,6 +10,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 import pytest
 
+from hydraulic_sim.effect import Effect
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sim.model_file import load_model
@@ -17,7 +18,7 @@ from hydraulic_sim.plant import Plant
 from hydraulic_sysid.data.records import Record
 from hydraulic_sysid.diagnosis.search import data_sheet_fits, recording_fits, search
 from hydraulic_sysid.diagnosis.search.candidate_fits import CandidateFits
-from hydraulic_sysid.diagnosis.search.candidates import RecordFeatures
+from hydraulic_sysid.diagnosis.search.candidates import SMALL, Probe, RecordFeatures, probes
 from hydraulic_sysid.diagnosis.search.criteria import CRITERIA
 from hydraulic_sysid.diagnosis.search.data_sheet import Deviation, priors, relaxed
 from hydraulic_sysid.diagnosis.search.data_sheet_fits import DataSheetFits
@@ -68,6 +69,26 @@ def test_a_probe_that_goes_too_far_is_tried_nearer(model: Model) -> None:
     at = Linearisation.of(model, split([record], [], model, 0.5))
     (found,) = score(at, [model.library["hose_compliance"]], RecordFeatures())
     assert found.start["hose_compliance.capacity"] == pytest.approx(CAPACITY, rel=0.3)  # by usual sizes a tenth of it
+
+
+@pytest.mark.parametrize(("louder", "nearer"), [(1.0, True), (8.0, True), (300.0, False)])
+def test_where_little_is_left_beyond_the_noise_a_probe_may_change_no_more(
+    model: Model, monkeypatch: pytest.MonkeyPatch, louder: float, nearer: bool
+) -> None:
+    seen = swept(model.with_effect("hose_compliance", {"capacity": CAPACITY}))
+    tried, rng = list[Sequence[float]](), np.random.default_rng(1)
+    noise = {"position": 2e-6, "pressure_a": 1e3, "pressure_b": 1e3}
+    channels = {c: np.asarray(seen[c]) + rng.normal(0.0, louder * s, len(seen)) for c, s in noise.items()}
+    record = Record("loud", np.asarray(seen.time), DT, {"drive": seen["drive"], **channels})
+
+    def asked(effect: Effect, features: RecordFeatures, sizes: Sequence[float]) -> Iterator[list[Probe]]:
+        tried.append(sizes)
+        return probes(effect, features, sizes)
+
+    monkeypatch.setattr("hydraulic_sysid.diagnosis.search.score_test.probes", asked)
+    at = Linearisation.of(model, split([record], [], model, 0.5))
+    score(at, [model.library["hose_compliance"]], RecordFeatures())
+    assert (SMALL in tried) == nearer
 
 
 def test_what_usual_sizes_hardly_touch_is_tried_larger(model: Model) -> None:

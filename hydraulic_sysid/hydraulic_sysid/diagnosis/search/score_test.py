@@ -78,10 +78,16 @@ def _score(at: Linearisation, one: Linearisation, effect: Effect, features: Reco
     tried = [predictions(SIZES)]
     if max((p.change for p in tried[0]), default=0.0) < CRITERIA.too_near:
         tried.append(predictions(LARGE))
-    if not tried[-1] or min(p.change for p in tried[-1]) > CRITERIA.too_far:
+    if not tried[-1] or min(p.change for p in tried[-1]) > CRITERIA.too_far * max(_beyond_noise(at), CRITERIA.law):
         tried.append(predictions(SMALL))
     found = [p.score for every in tried for p in every]
     return _best(found) if found else None
+
+
+def _beyond_noise(at: Linearisation) -> float:
+    """The share (0…1) of the sum of squares that noise does not explain."""
+    left = sum(float(c.sum()) for c in at.costs)
+    return max(1.0 - sum(int(s.counted.sum()) for s in at.split.segments) / left, 0.0) if left > 0.0 else 0.0
 
 
 def _best(found: Sequence[CandidateScore]) -> CandidateScore:
