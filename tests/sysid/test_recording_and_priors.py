@@ -6,7 +6,8 @@ import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from hydraulic_sysid.diagnosis.search.misfit import Misfit
 from hydraulic_sysid.diagnosis.search.recording_faults import HYPOTHESES, Hypothesis, RecordingFault
 from hydraulic_sysid.diagnosis.search.recording_fits import together
 from hydraulic_sysid.diagnosis.search.remainder import Remainder, immaterial
+from hydraulic_sysid.diagnosis.search.search import Search
 from hydraulic_sysid.diagnosis.search.set_aside import accidents
 from hydraulic_sysid.diagnosis.search.verdict import set_aside_sentences
 from hydraulic_sysid.estimation.fit import FitSettings, fit_segments
@@ -402,6 +404,45 @@ def test_what_shows_in_segments_of_one_role_is_shared_out_to_both(acts: list[int
     much = squares > 2.0
     assert 0 < np.count_nonzero(shared[much]) < len(acts)
     assert (shared[~much] == fit[~much]).all()
+
+
+class Silent:
+    """Progress of which nothing is told."""
+
+    def __call__(self, trying: str) -> None:
+        """Nothing."""
+
+    def reached(self, *_: object) -> None:
+        """Nothing."""
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+def test_what_wrong_numbers_do_where_it_was_fitted_is_shared_out_after_they_were_found(
+    monkeypatch: pytest.MonkeyPatch, hidden: bool
+) -> None:
+    """A limit of the valve that only segments for validation reach looks like other areas to all others."""
+    fits, given = object.__new__(Search), load_model("sample_bench")
+    asked, loosened = list[str](), list[str]()
+
+    def state(model: Any, *_: object) -> Any:
+        return SimpleNamespace(model=given, misfit=None, name="strict")
+
+    def loose(strict: Any) -> Any:
+        loosened.append(strict.name)
+        return SimpleNamespace(model=given, misfit=None, name=f"loose {len(loosened)}")
+
+    def shared_out(state: Any) -> bool:
+        asked.append(state.name)
+        return hidden and state.name == "loose 1"
+
+    for name, function in {"state": state, "loosened": loose, "shared_out": shared_out}.items():
+        monkeypatch.setattr(fits, name, function, raising=False)
+    own = {"given": given, "say": Silent(), "_first": FitSettings(), "judged": lambda state: state}
+    for name, value in own.items():
+        monkeypatch.setattr(fits, name, value, raising=False)
+    found: Any = fits.begin()
+    assert asked == ["strict", "loose 1"]
+    assert found.name == ("loose 2" if hidden else "loose 1")
 
 
 @pytest.mark.parametrize(("acts", "mixed"), [([4, 5, 6], True), ([], True), ([6, 7, 8], False)])

@@ -62,14 +62,25 @@ class Search(RecordingFits):
         """The model, fitted and judged by the noise that it leaves; the data sheet is relaxed where that helps."""
         self.say("fitting the model")
         strict = self.judged(self.state(self.given, self._first))
-        shared = self.split.shared_out([np.mean(r**2, axis=1) for r in strict.residual])
-        if shared is not self.split:
-            self.say("what is missing shows in a few segments: these are shared out anew to be fitted and to validate")
-            self.split = shared
-            strict = self.judged(self.state(strict.model, self._first))
+        strict = self.judged(self.state(strict.model, self._first)) if self.shared_out(strict) else strict
         self.path = [strict]
         self.say.reached((), strict.misfit)
+        loose = self.loosened(strict)
+        # Numbers of the data sheet may do all that is missing where it was fitted, and so show where it was not.
+        if loose is strict or not self.shared_out(loose):
+            return loose
+        strict = self.judged(self.state(strict.model, self._first))
+        self.path = [strict]
         return self.loosened(strict)
+
+    def shared_out(self, state: SearchState) -> bool:
+        """Whether what a state leaves was nearly all of one role; now it is of both."""
+        shared = self.split.shared_out([np.mean(r**2, axis=1) for r in state.residual])
+        if shared is self.split:
+            return False
+        self.say("what is missing shows in a few segments: these are shared out anew to be fitted and to validate")
+        self.split = shared
+        return True
 
     def run(self) -> SearchResult:
         """Search until the noise by which it judged is the noise that its result leaves.
