@@ -113,12 +113,12 @@ def diagnose(
         # Where most is left, what was added is a proxy for something else, and bends curves and balances.
         proxy = explained(found.base.misfit, found.final.misfit) < CRITERIA.hopeless
         suspect = found.base if proxy else found.final
-        much, open_ = found.final.misfit.usual > CRITERIA.right_law, not (found.by_force or found.stopped)
+        much, asked = found.final.misfit.usual > CRITERIA.right_law, not (found.by_force or found.stopped)
         where = NOT_KNOWN
-        if outside or (open_ and not found.final.misfit.little):
+        if outside or (asked and not found.final.misfit.little):
             # What is periodic of itself shows beside what follows the motion, proxy or not.
             where = Whereabouts(sines=periodic_inputs(found.final.linearisation, say))
-        if outside or (open_ and found.added and much):
+        if outside or (asked and found.added and much):
             where = Whereabouts.of(search.curves(suspect, say), (), where.sines)
         verdict = verdicts.reviewed(verdict, found, where)
         outside = verdict.kind == verdicts.OUTSIDE

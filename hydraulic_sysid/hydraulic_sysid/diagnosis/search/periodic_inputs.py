@@ -9,11 +9,12 @@ the drive asks for, of which a sine of any frequency explains little.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hydraulic_sim.arrays import Array
+from hydraulic_sysid.estimation.levenberg_marquardt import NormalEquations
 
 from .candidates import subsystem
 from .criteria import CRITERIA
@@ -52,7 +53,10 @@ def periodic_inputs(at: Linearisation, say: Callable[[str], None]) -> list[Perio
     """
     part, _ = at.sample(CRITERIA.enough_to_score)
     say("what may be periodic of itself")
-    found = [f for f in (_best(part, Courses.of(part, place, KNOTS)) for place in over_time(part)) if f is not None]
+    free = replace(part.normal, information=part.normal.information + np.diag(anywhere_allowed(part.parameters)))
+    alone, left = _fitted(0.0, (), free)[0], unexplained(part)
+    every = (Courses.of(part, place, KNOTS) for place in over_time(part))
+    found = [_best(part, courses, free, alone, left) for courses in every if courses is not None]
     most = max((f.share for f in found), default=0.0)
     return sorted(found, key=lambda f: (_after(f, most), -f.share))
 
@@ -62,21 +66,18 @@ def _after(found: PeriodicInput, most: float) -> int:
     return 2 if not near else 0 if found.subsystem in OF_THEMSELVES else 1
 
 
-def _best(at: Linearisation, courses: Courses | None) -> PeriodicInput | None:
-    if courses is None:
-        return None
-    stretches, fixed = list(_stretches(at, courses)), _Fixed.of(at)
-    length = longest_segment(at)
+def _best(at: Linearisation, courses: Courses, free: NormalEquations, alone: float, left: float) -> PeriodicInput:
+    """The best sine at a place; parameters that are ``free`` too explain so much ``alone`` of what is ``left``."""
+    stretches, length = list(_stretches(at, courses)), longest_segment(at)
     # Where few segments of a stretch were kept, so that they see a period at least.
     seen = float(np.median([len(s.times) for s in stretches]))
     slowest = max(_PERIODS / _TOGETHER, 1.0 / seen) / length
     step = 1.0 / (_FINER * _TOGETHER * length)
     tried = np.arange(slowest, 1.0 / (_FINEST * courses.width), step)
-    coarse = float(max(tried, key=lambda f: _fitted(float(f), stretches, fixed)[0]))
+    coarse = float(max(tried, key=lambda f: _fitted(float(f), stretches, free)[0]))
     finer = np.linspace(coarse - step, coarse + step, 2 * _FINER + 1)
-    frequency = float(max(finer, key=lambda f: _fitted(float(f), stretches, fixed)[0]))
-    explained, height = _fitted(frequency, stretches, fixed)
-    explained -= fixed.explain
+    frequency = float(max(finer, key=lambda f: _fitted(float(f), stretches, free)[0]))
+    explained, height = _fitted(frequency, stretches, free)
     place = courses.place
     return PeriodicInput(
         place.effect.name,
@@ -85,31 +86,8 @@ def _best(at: Linearisation, courses: Courses | None) -> PeriodicInput | None:
         frequency,
         height * place.height.default,
         place.height.unit,
-        min(max(explained / max(unexplained(at), 1e-300), 0.0), 1.0),
+        min(max((explained - alone) / max(left, 1e-300), 0.0), 1.0),
     )
-
-
-@dataclass(frozen=True)
-class _Fixed:
-    """Normal equations of the free parameters alone, and what they ``explain`` without a sine."""
-
-    information: Array
-    gradient: Array
-
-    @property
-    def explain(self) -> float:
-        """The fall of the sum of squares."""
-        return float(self.gradient @ np.linalg.pinv(self.information, rcond=1e-12, hermitian=True) @ self.gradient)
-
-    @classmethod
-    def of(cls, at: Linearisation) -> _Fixed:
-        parameters = at.parameters
-        information = np.diag(parameters.prior_information + anywhere_allowed(parameters))
-        gradient = parameters.prior_gradient.copy()
-        for columns, residual in zip(at.beyond, at.residual, strict=True):
-            information += np.tensordot(columns, columns, axes=([0, 1], [0, 1]))
-            gradient += np.tensordot(columns, residual, axes=([0, 1], [0, 1]))
-        return cls(information, gradient)
 
 
 @dataclass(frozen=True)
@@ -146,15 +124,15 @@ def _stretches(at: Linearisation, courses: Courses) -> Iterator[_Stretch]:
             yield _Stretch(times[here], own[here], score[here], cross[here])
 
 
-def _fitted(frequency: float, stretches: Sequence[_Stretch], fixed: _Fixed) -> tuple[float, float]:
+def _fitted(frequency: float, stretches: Sequence[_Stretch], free: NormalEquations) -> tuple[float, float]:
     """The fall of the sum of squares beyond that by chance, and the amplitude in heights of a hat."""
-    free, unknowns = len(fixed.gradient), 2 * len(stretches)
-    information, gradient = np.zeros((free + unknowns, free + unknowns)), np.zeros(free + unknowns)
-    information[:free, :free], gradient[:free] = fixed.information, fixed.gradient
+    own, unknowns = len(free.gradient), 2 * len(stretches)
+    information, gradient = np.zeros((own + unknowns, own + unknowns)), np.zeros(own + unknowns)
+    information[:own, :own], gradient[:own] = free.information, free.gradient
     for i, stretch in enumerate(stretches):
-        at = slice(free + 2 * i, free + 2 * i + 2)
-        information[at, at], gradient[at], information[at, :free] = stretch.of_sine(frequency)
-        information[:free, at] = information[at, :free].T
+        at = slice(own + 2 * i, own + 2 * i + 2)
+        information[at, at], gradient[at], information[at, :own] = stretch.of_sine(frequency)
+        information[:own, at] = information[at, :own].T
     change = -np.linalg.pinv(information, rcond=1e-12, hermitian=True) @ gradient
-    amplitude = float(np.sqrt(np.sum(change[free:] ** 2) / len(stretches)))
+    amplitude = float(np.sqrt(np.sum(change[own:] ** 2) / max(len(stretches), 1)))
     return float(-gradient @ change) - unknowns, amplitude
