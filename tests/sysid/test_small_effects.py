@@ -76,6 +76,6 @@ def test_what_is_left_where_an_effect_vanishes_says_whether_its_gain_is_its_own(
     """A tenth of a gram behind a stiff contact changes nothing but the steps of the integrator."""
     looked = search(model, model.with_effect("valve_deadband", {"width": 0.02}) if own else model)
     after = looked.as_it_is(model.with_effect(effect, values))
-    gained = looked.state(model).misfit.total if own else after.misfit.total + 50.0
-    before = SimpleNamespace(misfit=SimpleNamespace(total=gained))
+    cost = looked.state(model).linearisation.point.cost if own else after.linearisation.point.cost + 50.0
+    before = SimpleNamespace(linearisation=SimpleNamespace(point=SimpleNamespace(cost=cost)))
     assert borrowed(cast(SearchState, before), after, effect) is not own

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import TypeVar
 
@@ -16,7 +17,7 @@ from .criteria import CRITERIA
 from .fitting import Fitting, Task, differentiable, with_fitted_values, without_derivative
 from .frozen_jacobian import Refit, refit, refit_rounded
 from .linearisation import Linearisation
-from .misfit import misfit
+from .misfit import material, misfit
 from .score_test import CandidateScore, score
 from .search_state import CandidateRefit, SearchState
 from .spectral_lines import record_features
@@ -32,6 +33,8 @@ class CandidateFits(Fitting):
         super().__init__(task)
         self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
         """The state that candidates were refitted on last, with these refits."""
+        self._doubted: tuple[SearchState | None, list[tuple[str, SearchState]]] = (None, [])
+        """The state that candidates were finished on last, and those that explain enough, but not in all segments."""
         self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
         self._seen: dict[frozenset[str], list[CandidateScore]] = {}
 
@@ -146,6 +149,8 @@ class CandidateFits(Fitting):
         # A quick refit keeps what the model was bent to where the effect acts: the sum alone is asked for.
         least = base.misfit.total - base.misfit.least
         worth = [r for r in base.refits if r.misfit.total < least and enough(r.name, r.misfit.summed, promised)]
+        doubted: list[tuple[str, SearchState]] = []
+        self._doubted = base, doubted
         if not worth:
             return None
         top = base.misfit.total - worth[0].misfit.total
@@ -162,9 +167,33 @@ class CandidateFits(Fitting):
             # What it is set against in the end is what it leaves at its best.
             best = [at_best(r, state) if r.name == tried.name else r for r in base.refits]
             base.refits[:] = sorted(best, key=lambda r: r.misfit.total)
-            if self.better(base, state) and enough(tried.name, state.misfit, 1.0):
+            if not enough(tried.name, state.misfit, 1.0):
+                continue
+            if self.better(base, state):
                 found.append(state)
+            elif material(base.misfit, state.misfit):
+                doubted.append((tried.name, state))
         return min(found, key=self.with_freedom, default=None)
+
+    def finish_two(self, base: SearchState, enough: Enough) -> tuple[SearchState | None, SearchState | None]:
+        """Of candidates finished, on none of which segments agree, the best, and with the one that it hides beside it.
+
+        Each of two blurs what the other explains. Beside the other segments must agree on each. None where they do not.
+        """
+        on, doubted = self._doubted
+        if self.quick or on is not base or not doubted:
+            return None, None
+        name, first = min(doubted, key=lambda one: one[1].misfit.total)
+        self.say(f"what {name} may hide")
+        first = self.explore(first, most=CRITERIA.later_refits)
+        both = self.finish(first, enough)
+        if both is None:
+            return None, None
+        with suppress(SimulationError):  # it does not run without it
+            other = self.state(both.model.without_effect(name), self._last)
+            if self.better(other, both):
+                return first, both
+        return None, None
 
     def with_freedom(self, state: SearchState) -> float:
         """What a state leaves and what its free parameters are worth: of two that leave the same the simpler is taken.

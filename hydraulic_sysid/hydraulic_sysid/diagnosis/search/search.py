@@ -46,7 +46,7 @@ from .set_aside import accidents
 from .spectral_lines import record_features
 from .uncertainty import Known, parameter_errors
 from .unseen import TriedOut, tried_out
-from .worth import anything, borrowed, decisive, near_competitors, superfluous, without_competitor, worth_adding
+from .worth import anything, borrowed, decisive, enough_at_first, near_competitors, superfluous, without_competitor, worth_adding
 
 
 class Search(RecordingFits):
@@ -303,10 +303,8 @@ class Search(RecordingFits):
         if known is not None and known.misfit.variance - 1.0 > CRITERIA.nothing_left:
             path[-1] = self.explore(known, most=CRITERIA.later_refits)
         while len(added) < CRITERIA.most_effects:
-            if added:
-                better = self.finish(path[-1], partial(worth_adding, base, path[-1], added))
-            else:
-                better = self.first_effect(base)
+            enough = partial(worth_adding, base, path[-1], added) if added else partial(enough_at_first, base)
+            better = self.finish(path[-1], enough) if added else self.first_effect(base)
             if better is not None and not added:
                 # The fit with an effect may have gone on where that without it had stopped.
                 without = better.model.without_effect(new_effect(better, base))
@@ -320,6 +318,9 @@ class Search(RecordingFits):
             if better is not None and added:
                 needed = CRITERIA.nearly * self.share_of_a_curve(path[-1], better)
                 better = better if explained(path[-1].misfit, better.misfit) >= needed else None
+            hidden = None
+            if better is None and len(added) + 1 < CRITERIA.most_effects:
+                hidden, better = self.finish_two(path[-1], enough)
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
             doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= CRITERIA.nothing_left)
             loose = self.loose(path[-1]) if doubtful else None
@@ -333,6 +334,9 @@ class Search(RecordingFits):
                 return self.onward(base, base.model, mended)
             if better is None:
                 break
+            if hidden is not None:
+                added.append(new_effect(hidden, path[-1]))
+                path.append(hidden)
             added.append(new_effect(better, path[-1]))
             self.path = [*path, better]
             self.say.reached(added, better.misfit)

@@ -97,7 +97,8 @@ def borrowed(before: SearchState, after: SearchState, name: str) -> bool:
     """Whether an effect leaves hardly more where it vanishes, everything else being as it is: its gain is not its own.
 
     A contact that swings fast has the plant integrated in shorter steps, even where nothing hangs on it. What is left
-    without an effect can only be less once all is fitted anew, so that what is its own comes back in full.
+    without an effect can only be less once all is fitted anew, so that what is its own comes back in full. Rounding
+    stays out of both: it has no derivative, and its noise is too small for what is left without it.
     """
     effect = after.model.library[name]
     if observed(effect):  # it stands beside the linearisation
@@ -111,7 +112,7 @@ def borrowed(before: SearchState, after: SearchState, name: str) -> bool:
     except SimulationError:  # it does not run without it
         return False
     back = sum(float(np.sum(new.costs - old)) for new, old in zip(without, point.costs, strict=True))
-    return back < CRITERIA.most_of * (before.misfit.total - after.misfit.total)
+    return back < CRITERIA.most_of * (before.linearisation.point.cost - point.cost)
 
 
 def leaves_most(before: Misfit, after: Misfit, nothing: bool = False) -> bool:
