@@ -305,15 +305,15 @@ class Search(RecordingFits):
         while len(added) < CRITERIA.most_effects:
             enough = partial(worth_adding, base, path[-1], added) if added else partial(enough_at_first, base)
             better = self.finish(path[-1], enough) if added else self.first_effect(base)
+            alone = better is not None and not borrowed(path[-1], better, new_effect(better, path[-1]))
             if better is not None and not added:
                 # The fit with an effect may have gone on where that without it had stopped.
                 without = better.model.without_effect(new_effect(better, base))
-                plain = self.state(without, self._last) if self.leads_elsewhere(without, base) else base
-                if not material(plain.misfit, better.misfit):
-                    base = replace(plain, refits=base.refits, scores=base.scores)
-                    path, better = [base], None
-            if better is not None and borrowed(path[-1], better, new_effect(better, path[-1])):
-                better = None
+                elsewhere = not alone or self.leads_elsewhere(without, base)
+                plain = self.state(without, self._last) if elsewhere else base
+                if material(base.misfit, plain.misfit) and not (alone and material(plain.misfit, better.misfit)):
+                    return self.forward(self.recorded(plain))
+            better = better if alone else None
             needed = 0.0
             if better is not None and added:
                 needed = CRITERIA.nearly * self.share_of_a_curve(path[-1], better)
@@ -324,7 +324,7 @@ class Search(RecordingFits):
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
             doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= CRITERIA.nothing_left)
             loose = self.loose(path[-1]) if doubtful else None
-            if loose is not None and (better is None or loose.misfit.total < better.misfit.total):
+            if loose is not None and (better is None or not self.beats(base, better, loose)):
                 loose, model = self.judged(loose), loose.model
                 for name in added:
                     model = model.without_effect(name)
@@ -357,6 +357,12 @@ class Search(RecordingFits):
                 misfits = self._misfits(base, final, kept, competing)
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
+
+    @staticmethod
+    def beats(base: SearchState, better: SearchState, loose: SearchState) -> bool:
+        """Whether an effect leaves less than other numbers of the data sheet do, by more than laws are right to."""
+        spared = CRITERIA.law_elsewhere * max(base.misfit.total - better.misfit.total, 0.0)
+        return better.misfit.total + spared < loose.misfit.total
 
     def curves(self, state: SearchState, say: Callable[[str], None]) -> list[NonparametricCurve]:
         """The curves of what a state leaves, the one that explains most first; those asked for last are kept."""
