@@ -39,6 +39,7 @@ from hydraulic_sysid.diagnosis.search.uncertainty import Known, parameter_errors
 from hydraulic_sysid.diagnosis.search.whereabouts import Whereabouts
 from hydraulic_sysid.diagnosis.search.worth import (
     absorbs_discrepancy,
+    anything,
     decisive,
     near_competitors,
     nothing_gained,
@@ -266,6 +267,7 @@ def test_a_further_effect_that_a_curve_beats_is_none(
         "fault_beside": lambda base, state, further, share: asked.append(share),
         "explore": lambda state, most: state,
         "reviewed": lambda base, final, added, competing: (final, added, competing),
+        "finish_two": lambda *_: (None, None),
         **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
     }
     for name, stub in {**stubs, "_curves": None}.items():
@@ -279,6 +281,82 @@ def test_a_further_effect_that_a_curve_beats_is_none(
     assert done.added == ["valve_deadband", "load_spring"][:named]
     assert asked[0] == pytest.approx(CRITERIA.nearly * share)
     assert search.curves(one, lambda _: None) is curves and times == ["taken"], "those of a state are taken once"
+
+
+@pytest.mark.parametrize(("beside", "named"), [(True, True), (False, False)])
+def test_two_effects_that_hide_each_other_are_named_if_segments_agree_on_each_beside_the_other(
+    model, beside: bool, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, other, both = ("valve_deadband",), ("load_spring",), ("valve_deadband", "load_spring")
+    left = {(): 60000.0, one: 55000.0, other: 56000.0, both: 40000.0}
+
+    def fitted(model: Model, *_: object) -> SearchState:
+        return state(model, left[tuple(e for e in both if e in model.effects)], {})
+
+    def tried(base: SearchState) -> list[CandidateRefit]:
+        free = [e for e in both if e not in base.model.effects]
+        fits = [(name, fitted(base.model.with_effect(name))) for name in free]
+        return [CandidateRefit(name, Refit(s.model, []), s.misfit) for name, s in fits]
+
+    def explored(base: SearchState, most: int = 0) -> SearchState:
+        return replace(base, refits=tried(base))
+
+    def better(before: SearchState, after: SearchState) -> bool:
+        alone = both[0] not in before.model.effects and both[1] not in before.model.effects
+        return not alone and (beside or both[0] in before.model.effects)
+
+    search = Search.__new__(Search)
+    search.say, search.split, search.given, search.quick = Progress(lambda _: None), Split([], []), model, False
+    search.settings, search.faults, search.as_recorded = FitSettings(), [], None
+    stubs = {
+        "state": fitted, "explore": explored, "better": better, "begun_anew": lambda state: state,
+        "set_against_others": lambda base, near: near, "with_freedom": lambda state: state.misfit.total,
+        "first_effect": lambda base: search.finish(base, anything), "share_of_a_curve": lambda *_: 0.0,
+        "reviewed": lambda base, final, added, competing: (final, added, competing),
+        **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
+        "fault_beside": lambda *_: None, "_last": None,
+    }  # fmt: skip
+    for name, stub in stubs.items():
+        monkeypatch.setattr(search, name, stub, raising=False)
+    monkeypatch.setattr("hydraulic_sysid.diagnosis.search.search.borrowed", lambda *_: False)
+    done = search.forward(explored(fitted(model)))
+    assert done.added == (list(both) if named else [])
+    assert list(done.misfits) == done.added
+    search.quick = True
+    assert search.forward(explored(fitted(model))).added == [], "a quick search leaves that out"
+
+
+@pytest.mark.parametrize("lower", [True, False])
+def test_a_model_that_a_fit_with_an_effect_led_out_of_a_local_minimum_is_searched_anew(
+    model, lower: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is left where the effect vanishes is hardly more."""
+    base, found = state(model, 99000.0, {}), iter([state(model.with_effect("entrained_air"), 62000.0, {}), None])
+    plain = state(model, 63000.0 if lower else 98990.0, {})
+    search = Search.__new__(Search)
+    search.say, search.split, search.given = Progress(lambda _: None), Split([], []), model
+    search.settings, search.faults, search.as_recorded = FitSettings(), [], None
+    seen: list[SearchState] = []
+    stubs = {
+        "state": lambda *_: plain, "first_effect": lambda base: next(found), "finish_two": lambda *_: (None, None),
+        "recorded": lambda state: seen.append(state) or state, "leads_elsewhere": lambda *_: False, "_last": None,
+    }  # fmt: skip
+    for name, stub in stubs.items():
+        monkeypatch.setattr(search, name, stub, raising=False)
+    monkeypatch.setattr("hydraulic_sysid.diagnosis.search.search.borrowed", lambda *_: True)
+    done = search.forward(base)
+    assert done.base is (plain if lower else base)
+    assert seen == [plain] * lower
+    assert done.added == []
+
+
+@pytest.mark.parametrize(("left", "named"), [(20000.0, True), (29990.0, False), (30010.0, False)])
+def test_an_effect_that_leaves_as_much_as_other_numbers_of_the_data_sheet_is_not_preferred(
+    model, left: float, named: bool
+) -> None:
+    """What it leaves less is a matter of the laws of what was found before."""
+    base, loose = state(model, 900000.0, {}), state(model, 30000.0, {})
+    assert Search.beats(base, state(model, left, {}), loose) is named
 
 
 @pytest.mark.parametrize(

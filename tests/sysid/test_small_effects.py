@@ -27,8 +27,8 @@ def model() -> Model:
     return load_model("sample_bench")
 
 
-def search(model: Model, plant: Model, steps: bool = False) -> Search:
-    """On a record of ``plant``: slow sines or steps, with noise of 3 µm and 2 kPa."""
+def search(model: Model, plant: Model, steps: bool = False, step: float = 0.0) -> Search:
+    """On a record of ``plant``: slow sines or steps, with noise of 3 µm and 2 kPa, the position in steps of ``step``."""
     rng = np.random.default_rng(11)
     t = DT * np.arange(round(SECONDS / DT))
     drive = 1.2 * np.sin(2.0 * np.pi * 0.4 * t) + 0.8 * np.sin(2.0 * np.pi * 1.3 * t)
@@ -37,6 +37,8 @@ def search(model: Model, plant: Model, steps: bool = False) -> Search:
     run = Plant(plant).simulate(drive, DT)
     noise = {"position": 3e-6, "pressure_a": 2e3, "pressure_b": 2e3}
     channels = {c: np.asarray(getattr(run, c)) + rng.normal(0.0, s, t.size) for c, s in noise.items()}
+    if step:
+        channels["position"] = step * np.round(channels["position"] / step)
     return Search.of(model, [Record("sines", t, DT, {"drive": drive, **channels})], [], FitSettings(), lambda _: None)
 
 
@@ -79,3 +81,19 @@ def test_what_is_left_where_an_effect_vanishes_says_whether_its_gain_is_its_own(
     cost = looked.state(model).linearisation.point.cost if own else after.linearisation.point.cost + 50.0
     before = SimpleNamespace(linearisation=SimpleNamespace(point=SimpleNamespace(cost=cost)))
     assert borrowed(cast(SearchState, before), after, effect) is not own
+
+
+def test_beside_rounding_the_gain_of_an_effect_is_its_own(model: Model) -> None:
+    """Where the noise is that beside steps of the sensor, a model without them leaves the steps, whatever it has."""
+    step, narrow = 1e-4, {"width": 0.0005}
+    plant = model.with_effect("valve_deadband", narrow)
+    looked = search(model, plant, step=step)
+    rounded = model.with_effect("sensor_quantisation", {"step": step})
+    full = rounded.with_effect("valve_deadband", narrow)
+    looked.judged(looked.state(full))
+    before, after = looked.state(rounded), looked.state(full)
+    gained = before.misfit.total - after.misfit.total
+    assert gained > CRITERIA.promises * before.misfit.least
+    smooth = before.linearisation.point.cost - after.linearisation.point.cost
+    assert smooth < CRITERIA.most_of * gained, "it shows less beside the steps"
+    assert not borrowed(before, after, "valve_deadband")
