@@ -28,7 +28,7 @@ def model() -> Model:
 
 
 def search(model: Model, plant: Model, steps: bool = False, step: float = 0.0) -> Search:
-    """On a record of ``plant``: slow sines or steps, with noise of 3 µm and 2 kPa, the position in steps of ``step``."""
+    """On a record of ``plant``: slow sines or steps, with noise of 3 µm and 2 kPa, perhaps read in a ``step``."""
     rng = np.random.default_rng(11)
     t = DT * np.arange(round(SECONDS / DT))
     drive = 1.2 * np.sin(2.0 * np.pi * 0.4 * t) + 0.8 * np.sin(2.0 * np.pi * 1.3 * t)

@@ -46,7 +46,16 @@ from .set_aside import accidents
 from .spectral_lines import record_features
 from .uncertainty import Known, parameter_errors
 from .unseen import TriedOut, tried_out
-from .worth import anything, borrowed, decisive, enough_at_first, near_competitors, superfluous, without_competitor, worth_adding
+from .worth import (
+    anything,
+    borrowed,
+    decisive,
+    enough_at_first,
+    near_competitors,
+    superfluous,
+    without_competitor,
+    worth_adding,
+)
 
 
 class Search(RecordingFits):
