@@ -39,7 +39,6 @@ from hydraulic_sysid.diagnosis.search.uncertainty import Known, parameter_errors
 from hydraulic_sysid.diagnosis.search.whereabouts import Whereabouts
 from hydraulic_sysid.diagnosis.search.worth import (
     absorbs_discrepancy,
-    anything,
     decisive,
     near_competitors,
     nothing_gained,
@@ -283,12 +282,21 @@ def test_a_further_effect_that_a_curve_beats_is_none(
     assert search.curves(one, lambda _: None) is curves and times == ["taken"], "those of a state are taken once"
 
 
-@pytest.mark.parametrize(("beside", "named"), [(True, True), (False, False)])
-def test_two_effects_that_hide_each_other_are_named_if_segments_agree_on_each_beside_the_other(
-    model, beside: bool, named: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("asked", "beside", "together", "named"),
+    [
+        ("alike in all segments", True, 4000.0, True),
+        ("alike in all segments", False, 4000.0, False),
+        ("alike in all segments", True, 20000.0, False),  # that is not nearly all
+        ("a good part", True, 4000.0, True),
+    ],
+)
+def test_two_effects_that_hide_each_other_are_named_if_each_is_more_than_chance_beside_the_other(
+    model, asked: str, beside: bool, together: float, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Alone each explains a part, but not alike in all segments, or it explains too little."""
     one, other, both = ("valve_deadband",), ("load_spring",), ("valve_deadband", "load_spring")
-    left = {(): 60000.0, one: 55000.0, other: 56000.0, both: 40000.0}
+    left = {(): 60000.0, one: 55000.0, other: 56000.0, both: together}
 
     def fitted(model: Model, *_: object) -> SearchState:
         return state(model, left[tuple(e for e in both if e in model.effects)], {})
@@ -302,8 +310,11 @@ def test_two_effects_that_hide_each_other_are_named_if_segments_agree_on_each_be
         return replace(base, refits=tried(base))
 
     def better(before: SearchState, after: SearchState) -> bool:
-        alone = both[0] not in before.model.effects and both[1] not in before.model.effects
-        return not alone and (beside or both[0] in before.model.effects)
+        alone = not {*both} & {*before.model.effects}
+        return asked == "a good part" if alone else beside or both[0] in before.model.effects
+
+    def enough(name: str, after: Misfit, part: float) -> bool:
+        return asked != "a good part" or after.total < 50000.0
 
     search = Search.__new__(Search)
     search.say, search.split, search.given, search.quick = Progress(lambda _: None), Split([], []), model, False
@@ -311,7 +322,7 @@ def test_two_effects_that_hide_each_other_are_named_if_segments_agree_on_each_be
     stubs = {
         "state": fitted, "explore": explored, "better": better, "begun_anew": lambda state: state,
         "set_against_others": lambda base, near: near, "with_freedom": lambda state: state.misfit.total,
-        "first_effect": lambda base: search.finish(base, anything), "share_of_a_curve": lambda *_: 0.0,
+        "first_effect": lambda base: search.finish(base, enough), "share_of_a_curve": lambda *_: 0.0,
         "reviewed": lambda base, final, added, competing: (final, added, competing),
         **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
         "fault_beside": lambda *_: None, "_last": None,
@@ -319,6 +330,7 @@ def test_two_effects_that_hide_each_other_are_named_if_segments_agree_on_each_be
     for name, stub in stubs.items():
         monkeypatch.setattr(search, name, stub, raising=False)
     monkeypatch.setattr("hydraulic_sysid.diagnosis.search.search.borrowed", lambda *_: False)
+    monkeypatch.setattr("hydraulic_sysid.diagnosis.search.search.enough_at_first", lambda base, *given: enough(*given))
     done = search.forward(explored(fitted(model)))
     assert done.added == (list(both) if named else [])
     assert list(done.misfits) == done.added

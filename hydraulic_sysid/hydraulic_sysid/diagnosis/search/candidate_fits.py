@@ -17,7 +17,7 @@ from .criteria import CRITERIA
 from .fitting import Fitting, Task, differentiable, with_fitted_values, without_derivative
 from .frozen_jacobian import Refit, refit, refit_rounded
 from .linearisation import Linearisation
-from .misfit import material, misfit
+from .misfit import explained, material, misfit
 from .score_test import CandidateScore, score
 from .search_state import CandidateRefit, SearchState
 from .spectral_lines import record_features
@@ -33,7 +33,7 @@ class CandidateFits(Fitting):
         super().__init__(task)
         self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
         """The state that candidates were refitted on last, with these refits."""
-        self._doubted: tuple[SearchState | None, list[tuple[str, SearchState]]] = (None, [])
+        self._doubted: tuple[SearchState | None, list[SearchState]] = (None, [])
         """The state that candidates were finished on last, and those that explain enough, but not in all segments."""
         self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
         self._seen: dict[frozenset[str], list[CandidateScore]] = {}
@@ -149,7 +149,7 @@ class CandidateFits(Fitting):
         # A quick refit keeps what the model was bent to where the effect acts: the sum alone is asked for.
         least = base.misfit.total - base.misfit.least
         worth = [r for r in base.refits if r.misfit.total < least and enough(r.name, r.misfit.summed, promised)]
-        doubted: list[tuple[str, SearchState]] = []
+        doubted: list[SearchState] = []
         self._doubted = base, doubted
         if not worth:
             return None
@@ -172,28 +172,47 @@ class CandidateFits(Fitting):
             if self.better(base, state):
                 found.append(state)
             elif material(base.misfit, state.misfit):
-                doubted.append((tried.name, state))
+                doubted.append(state)
         return min(found, key=self.with_freedom, default=None)
 
     def finish_two(self, base: SearchState, enough: Enough) -> tuple[SearchState | None, SearchState | None]:
-        """Of candidates finished, on none of which segments agree, the best, and with the one that it hides beside it.
+        """A state with one more effect and its candidates, and one with two, that nearly all is explained by together.
 
-        Each of two blurs what the other explains. Beside the other segments must agree on each. None where they do not.
+        Each of two may hide what the other explains, so that neither explains a part alone, or segments do not agree on
+        either. Beside the other each must be more than chance. None where they are not; a quick search leaves that out.
         """
-        on, doubted = self._doubted
-        if self.quick or on is not base or not doubted:
+        first = None if self.quick else self._best_alone(base)
+        if first is None:
             return None, None
-        name, first = min(doubted, key=lambda one: one[1].misfit.total)
-        self.say(f"what {name} may hide")
+        name = next(e for e in first.model.effects if e not in base.model.effects)
+        self.say(f"what may hide beside {name}")
         first = self.explore(first, most=CRITERIA.later_refits)
         both = self.finish(first, enough)
-        if both is None:
+        if both is None or explained(base.misfit, both.misfit) < CRITERIA.nearly:
             return None, None
         with suppress(SimulationError):  # it does not run without it
             other = self.state(both.model.without_effect(name), self._last)
             if self.better(other, both):
                 return first, both
         return None, None
+
+    def _best_alone(self, base: SearchState) -> SearchState | None:
+        """The best state with one more effect that explains anything, fitted to the end.
+
+        Not with one such as rounding, which shows only once all else is right.
+        """
+        on, doubted = self._doubted
+        doubted = [s for s in doubted if without_derivative(s.model) == without_derivative(base.model)]
+        if on is base and doubted:
+            return min(doubted, key=lambda s: s.misfit.total)
+        refits = [r for r in base.refits if not observed(base.model.library[r.name])]
+        if not refits or base.misfit.total - refits[0].misfit.total <= base.misfit.least:
+            return None
+        self.say(f"fitting with {refits[0].name}")
+        with suppress(SimulationError):
+            state = self.begun_anew(self.state(refits[0].refit.model, self._last))
+            return state if material(base.misfit, state.misfit) else None
+        return None
 
     def with_freedom(self, state: SearchState) -> float:
         """What a state leaves and what its free parameters are worth: of two that leave the same the simpler is taken.
