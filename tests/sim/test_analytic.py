@@ -247,7 +247,7 @@ def test_a_step_of_the_spool_under_its_rate_limit_is_a_ramp(hydraulic: Build) ->
 OPENINGS: dict[str, tuple[dict[str, float], Callable[[float], float]]] = {
     "valve_deadband": ({"width": 0.1}, lambda s: math.copysign(max(abs(s) - 0.1, 0.0), s)),
     "valve_null_bias": ({"bias": -0.05}, lambda s: s - 0.05),
-    "valve_flow_saturation": ({"limit": 0.6}, lambda s: min(max(s, -0.6), 0.6)),
+    "valve_flow_saturation": ({"limit": 0.6, "rounding": 0.0}, lambda s: min(max(s, -0.6), 0.6)),
     "valve_gain_asymmetry": ({"asymmetry": 0.2}, lambda s: s * (1.2 if s > 0.0 else 0.8)),
     "valve_gain_curve": ({"progression": 0.3}, lambda s: 0.7 * s + 0.3 * s * abs(s)),
 }
@@ -260,6 +260,14 @@ def test_the_opening_over_the_drive(hydraulic: Build, name: str) -> None:
     drive = np.linspace(-12.0, 12.0, 49)
     run = plant.simulate(drive, DT)
     assert run.opening == pytest.approx([curve(min(max(u / 10.0, -1.0), 1.0)) for u in drive], abs=1e-15)
+
+
+def test_a_round_corner_is_that_of_two_orifices_in_series(hydraulic: Build) -> None:
+    """Two of areas s and 1 in series act as s/√(1 + s²)."""
+    plant = hydraulic(valve_flow_saturation={"limit": 0.604, "rounding": 1.249})
+    drive = np.linspace(-10.0, 10.0, 41)
+    wide = drive / 10.0
+    assert 1.267 * plant.simulate(drive, DT).opening == pytest.approx(wide / np.hypot(1.0, wide), abs=2e-3)
 
 
 def test_an_underlapped_valve_passes_oil_through_its_centre(hydraulic: Build) -> None:

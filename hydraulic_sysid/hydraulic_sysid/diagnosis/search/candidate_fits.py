@@ -34,7 +34,7 @@ class CandidateFits(Fitting):
         self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
         """The state that candidates were refitted on last, with these refits."""
         self._doubted: tuple[SearchState | None, list[SearchState]] = (None, [])
-        """The state that candidates were finished on last, and those that explain enough, but not in all segments."""
+        """The state that candidates were finished on last, and those that explain too little, or not in all segments."""
         self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
         self._seen: dict[frozenset[str], list[CandidateScore]] = {}
 
@@ -167,9 +167,7 @@ class CandidateFits(Fitting):
             # What it is set against in the end is what it leaves at its best.
             best = [at_best(r, state) if r.name == tried.name else r for r in base.refits]
             base.refits[:] = sorted(best, key=lambda r: r.misfit.total)
-            if not enough(tried.name, state.misfit, 1.0):
-                continue
-            if self.better(base, state):
+            if enough(tried.name, state.misfit, 1.0) and self.better(base, state):
                 found.append(state)
             elif material(base.misfit, state.misfit):
                 doubted.append(state)
@@ -181,9 +179,12 @@ class CandidateFits(Fitting):
         Each of two may hide what the other explains, so that neither explains a part alone, or segments do not agree on
         either. Beside the other each must be more than chance. None where they are not; a quick search leaves that out.
         """
-        first = None if self.quick else self._best_alone(base)
-        if first is None:
+        on, doubted = self._doubted
+        # Rounding shows only once all else is right.
+        doubted = [s for s in doubted if without_derivative(s.model) == without_derivative(base.model)]
+        if self.quick or on is not base or not doubted:
             return None, None
+        first = min(doubted, key=lambda s: s.misfit.total)
         name = next(e for e in first.model.effects if e not in base.model.effects)
         self.say(f"what may hide beside {name}")
         first = self.explore(first, most=CRITERIA.later_refits)
@@ -195,24 +196,6 @@ class CandidateFits(Fitting):
             if self.better(other, both):
                 return first, both
         return None, None
-
-    def _best_alone(self, base: SearchState) -> SearchState | None:
-        """The best state with one more effect that explains anything, fitted to the end.
-
-        Not with one such as rounding, which shows only once all else is right.
-        """
-        on, doubted = self._doubted
-        doubted = [s for s in doubted if without_derivative(s.model) == without_derivative(base.model)]
-        if on is base and doubted:
-            return min(doubted, key=lambda s: s.misfit.total)
-        refits = [r for r in base.refits if not observed(base.model.library[r.name])]
-        if not refits or base.misfit.total - refits[0].misfit.total <= base.misfit.least:
-            return None
-        self.say(f"fitting with {refits[0].name}")
-        with suppress(SimulationError):
-            state = self.begun_anew(self.state(refits[0].refit.model, self._last))
-            return state if material(base.misfit, state.misfit) else None
-        return None
 
     def with_freedom(self, state: SearchState) -> float:
         """What a state leaves and what its free parameters are worth: of two that leave the same the simpler is taken.

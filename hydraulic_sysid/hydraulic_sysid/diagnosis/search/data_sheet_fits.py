@@ -138,13 +138,16 @@ class DataSheetFits(CandidateFits):
             numbers_instead=tuple(taken),
         )  # fmt: skip
 
-    def fewest_moved(self, final: SearchState, strict: SearchState | None) -> tuple[SearchState, list[Deviation]]:
+    def fewest_moved(
+        self, final: SearchState, strict: SearchState | None, enough: float = 0.0
+    ) -> tuple[SearchState, list[Deviation]]:
         """The state in which as few numbers of the data sheet move as explain what all of them do, and these numbers.
 
-        ``final``: all are free; ``strict``: none is, where that is known.
+        ``final``: all are free; ``strict``: none is, where that is known; ``enough``: of the sum of squares, that they
+        may explain less, at least what counts.
         """
         held = HeldNumbers.of(final.linearisation, self.given)
-        enough = least_cost(final.misfit.count, final.misfit.variance)
+        enough = max(enough, least_cost(final.misfit.count, final.misfit.variance))
         # Far from the file's values the quadratic says little: the data sheet as it is comes first, fitted.
         for moved in chain([()], filter(None, held.fewest(enough, CRITERIA.clear * enough))):
             done = strict if strict is not None and not moved else self.with_moved(final, moved)
@@ -171,6 +174,17 @@ class DataSheetFits(CandidateFits):
         """A state with the data sheet as it was given but for the numbers ``moved``."""
         self.say("fitting with the data sheet as it is" + (f", but for {' and '.join(moved)}" if moved else ""))
         return self.state(restored(state.model, self.given, moved), self._last)
+
+    def sheet_instead(self, base: SearchState, better: SearchState, loose: SearchState) -> bool:
+        """Whether other numbers of the data sheet leave less than one more effect does.
+
+        Where both leave the same but for what laws found before are right to, no more of them than that effect has.
+        """
+        free = [k for k in better.model.movable_keys() if k not in loose.model.movable_keys()]
+        spared = CRITERIA.law_elsewhere * max(base.misfit.total - loose.misfit.total, 0.0)
+        if abs(better.misfit.total - loose.misfit.total) >= spared:
+            return loose.misfit.total < better.misfit.total
+        return len(self.fewest_moved(loose, None, spared)[1]) <= len(free)
 
     def deviation(self, held: HeldNumbers, key: str, moved: Sequence[str], state: SearchState) -> Deviation:
         """One of the numbers ``moved`` in a state."""

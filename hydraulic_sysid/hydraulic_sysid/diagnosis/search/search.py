@@ -333,7 +333,7 @@ class Search(RecordingFits):
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
             doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= CRITERIA.nothing_left)
             loose = self.loose(path[-1]) if doubtful else None
-            if loose is not None and (better is None or not self.beats(base, better, loose)):
+            if loose is not None and (better is None or self.sheet_instead(base, better, loose)):
                 loose, model = self.judged(loose), loose.model
                 for name in added:
                     model = model.without_effect(name)
@@ -366,12 +366,6 @@ class Search(RecordingFits):
                 misfits = self._misfits(base, final, kept, competing)
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
-
-    @staticmethod
-    def beats(base: SearchState, better: SearchState, loose: SearchState) -> bool:
-        """Whether an effect leaves less than other numbers of the data sheet do, by more than laws are right to."""
-        spared = CRITERIA.law_elsewhere * max(base.misfit.total - better.misfit.total, 0.0)
-        return better.misfit.total + spared < loose.misfit.total
 
     def curves(self, state: SearchState, say: Callable[[str], None]) -> list[NonparametricCurve]:
         """The curves of what a state leaves, the one that explains most first; those asked for last are kept."""

@@ -169,8 +169,13 @@ def kind_of(result: SearchResult, tied: bool, where: Whereabouts = NOT_KNOWN) ->
 
 
 def goes_on(result: SearchResult, where: Whereabouts) -> bool:
-    """Whether the most of what is left is periodic of itself; a drive that is not known may be."""
-    return where.sine is not None and not (result.final.misfit.little or drive_unknown(result))
+    """Whether the most of what is left is periodic of itself; a drive that is not known may be.
+
+    A law of what was found that is not quite the bench's leaves what follows a periodic drive.
+    """
+    final = result.final.misfit
+    little = final.little or unexplained_share(result.before_laws, final) < CRITERIA.unknown_laws
+    return where.sine is not None and not (little or drive_unknown(result))
 
 
 def faulty(result: SearchResult) -> bool:
