@@ -362,13 +362,26 @@ def test_a_model_that_a_fit_with_an_effect_led_out_of_a_local_minimum_is_searche
     assert done.added == []
 
 
-@pytest.mark.parametrize(("left", "named"), [(20000.0, True), (29990.0, False), (30010.0, False)])
-def test_an_effect_that_leaves_as_much_as_other_numbers_of_the_data_sheet_is_not_preferred(
-    model, left: float, named: bool
+@pytest.mark.parametrize(
+    ("left", "numbers", "sheet"),
+    [
+        (20000.0, 1, False),  # it leaves clearly less
+        (40000.0, 3, True),
+        (29900.0, 1, True),  # … or less by what laws are right to: one number is likelier than an effect
+        (29900.0, 2, False),  # of one parameter, and two are not
+        (30100.0, 2, False),
+    ],
+)
+def test_of_an_effect_and_other_numbers_that_leave_as_much_the_fewer_are_taken(
+    model, left: float, numbers: int, sheet: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What it leaves less is a matter of the laws of what was found before."""
     base, loose = state(model, 900000.0, {}), state(model, 30000.0, {})
-    assert Search.beats(base, state(model, left, {}), loose) is named
+    asked: list[float] = []
+    fits = object.__new__(Search)
+    moved = [SimpleNamespace(key=str(i)) for i in range(numbers)]
+    monkeypatch.setattr(Search, "fewest_moved", lambda self, *given: asked.append(given[2]) or (loose, moved))
+    assert fits.sheet_instead(base, state(model.with_effect("constant_load"), left, {}), loose) is sheet
+    assert asked == [pytest.approx(CRITERIA.law_elsewhere * 870000.0)] * (abs(left - 30000.0) < 435.0)
 
 
 @pytest.mark.parametrize(
@@ -420,15 +433,18 @@ def test_what_no_curve_explains_is_no_other_effect(model, share: float | None, k
 
 
 @pytest.mark.parametrize(
-    ("after", "share", "kind"),
+    ("before", "after", "share", "kind"),
     [
-        (1.3, 0.7, verdict.OUTSIDE),
-        (1.3, 0.3, verdict.MISSING),  # what follows the motion is no sine
-        (1.02, 0.9, verdict.MISSING),  # nothing is left
+        (10.0, 1.3, 0.7, verdict.OUTSIDE),
+        (10.0, 1.3, 0.3, verdict.MISSING),  # what follows the motion is no sine
+        (10.0, 1.02, 0.9, verdict.MISSING),  # nothing is left
+        (150.0, 1.1, 0.9, verdict.MISSING),  # … that is more than the laws of what was found leave
     ],
 )
-def test_what_swings_of_itself_is_outside_the_library(model, after: float, share: float, kind: str) -> None:
-    base, final = state(model, 30000.0, {}), state(model.with_effect("constant_load"), 3000 * after, {})
+def test_what_swings_of_itself_is_outside_the_library(
+    model, before: float, after: float, share: float, kind: str
+) -> None:
+    base, final = state(model, 3000 * before, {}), state(model.with_effect("constant_load"), 3000 * after, {})
     found = SearchResult(model, Split([], []), FitSettings(), base, final, {"constant_load": final.misfit}, {})
     where = Whereabouts(sines=[SimpleNamespace(share=share)])
     assert verdict.kind_of(found, tied=False, where=where) == kind
