@@ -34,7 +34,7 @@ class CandidateFits(Fitting):
         self.tried: tuple[SearchState | None, list[CandidateRefit]] = (None, [])
         """The state that candidates were refitted on last, with these refits."""
         self._doubted: tuple[SearchState | None, list[SearchState]] = (None, [])
-        """The state that candidates were finished on last; with those that explain too little, or not in all segments."""
+        """The state that candidates were finished on last, with those that explain too little or not everywhere."""
         self._scored: tuple[Linearisation, list[CandidateScore]] | None = None
         self._seen: dict[frozenset[str], list[CandidateScore]] = {}
 

@@ -96,7 +96,7 @@ def diagnose(
     seconds, or when the user ends it (KeyboardInterrupt), the best so far is the answer, marked as such. ``watch``
     takes what is found meanwhile: the residual whenever it is lower, and the table of candidates. A ``quick`` search
     uses fewer measured values, spread over all records, and leaves out what only confirms: whether noise hides small
-    effects, whether one effect does what several numbers do, and the balances of the whole records.
+    effects, whether two effects hide each other, and the balances of the whole records.
 
     :raises DiagnosisError: no records, or unusable ones.
     :raises hydraulic_sim.errors.ModelError: a model that does not compose.

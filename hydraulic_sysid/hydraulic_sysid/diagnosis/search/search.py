@@ -100,7 +100,7 @@ class Search(RecordingFits):
         """
         try:
             searched = self.rivals_begun_anew(decisive(self.searched()))
-            concluded = self.rivals_as_filed(self.concluded(searched, others=not self.quick))
+            concluded = self.rivals_as_filed(self.concluded(searched))
             concluded = concluded if self.quick else self.rivals_finished(concluded)
             concluded = self.set_against_effect(self.set_against_faults(concluded))
             found = accidents_named(self.by_force(self.with_other_gains(concluded)))
