@@ -122,5 +122,7 @@ def test_test_data_change_nothing_but_what_is_said_of_them(model: Model) -> None
     assert one.result["test"]["records"] == ("alike",) and one.result["test"]["seconds"] == pytest.approx(3.9, abs=0.4)
     assert one.result["test"]["after"] < 1.03 < 1.3 < one.result["test"]["before"]
     assert two.result["test"]["before"] < two.result["test"]["after"]
+    assert "× of what was validated on, most of all in without from " in two.result["verdict"]["text"]
+    assert "validated on" not in one.result["verdict"]["text"]
     assert "On unseen data (" in one.result["verdict"]["text"]
     assert bare.result["test"] is None and "Nothing was left to test on" in bare.result["verdict"]["text"]

@@ -173,7 +173,7 @@ class Criteria:
         "nothing", "2 of 13, no verdict",
     )  # fmt: skip
     lopsided_beyond: float = _constant(
-        0.1, "mean square over noise", "beyond the noise in that role, from which that is no chance",
+        0.1, "mean square over noise", "beyond the noise there, or in test data beyond validation data: no chance",
         "nothing", "1 of 13, no verdict",
     )  # fmt: skip
     much_in_a_segment: float = _constant(

@@ -316,11 +316,8 @@ class Search(RecordingFits):
             better = self.finish(path[-1], enough) if added else self.first_effect(base)
             alone = better is not None and not borrowed(path[-1], better, new_effect(better, path[-1]))
             if better is not None and not added:
-                # The fit with an effect may have gone on where that without it had stopped.
-                without = better.model.without_effect(new_effect(better, base))
-                elsewhere = not alone or self.leads_elsewhere(without, base)
-                plain = self.state(without, self._last) if elsewhere else base
-                if material(base.misfit, plain.misfit) and not (alone and material(plain.misfit, better.misfit)):
+                plain = self.led_on(base, better, alone)
+                if plain is not None:
                     return self.forward(self.recorded(plain))
             better = better if alone else None
             needed = 0.0
@@ -366,6 +363,16 @@ class Search(RecordingFits):
                 misfits = self._misfits(base, final, kept, competing)
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
+
+    def led_on(self, base: SearchState, better: SearchState, alone: bool) -> SearchState | None:
+        """The model without the effect of a ``better`` state, where that only led its fit out of a local minimum.
+
+        ``alone``: whether the effect's gain is its own.
+        """
+        without = better.model.without_effect(new_effect(better, base))
+        plain = self.state(without, self._last) if not alone or self.leads_elsewhere(without, base) else base
+        less = material(base.misfit, plain.misfit)
+        return plain if less and not (alone and material(plain.misfit, better.misfit)) else None
 
     def curves(self, state: SearchState, say: Callable[[str], None]) -> list[NonparametricCurve]:
         """The curves of what a state leaves, the one that explains most first; those asked for last are kept."""

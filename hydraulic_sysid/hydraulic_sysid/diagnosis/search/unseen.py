@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hydraulic_sim.arrays import Array
 from hydraulic_sim.errors import SimulationError
 from hydraulic_sim.model import Model
 from hydraulic_sysid.data.display import quantity
@@ -14,6 +15,7 @@ from hydraulic_sysid.estimation.noise_model import ChannelNoise
 from hydraulic_sysid.estimation.refinement import with_hum, without_outliers
 from hydraulic_sysid.estimation.segments import Segments
 
+from .criteria import CRITERIA
 from .fitting import differentiable
 from .frozen_jacobian import left_rounded
 from .holdout import Split
@@ -53,9 +55,10 @@ def tried_out(result: SearchResult, laws: Callable[[Model], Collection[str]]) ->
     readings = [s.readings for s in judged_alike(split.to_test, first.linearisation.split.segments)]
     try:
         judged = with_laws(result.final.model, judged, laws)
-        after = left_of(result.final.model, judged)
+        costs = costs_of(result.final.model, judged)
+        after = over_noise(judged, costs)
         as_recorded = [replace(s, readings=r) for s, r in zip(judged, readings, strict=True)]
-        before = left_of(first.model, as_recorded) if changed else after
+        before = over_noise(judged, costs_of(first.model, as_recorded)) if changed else after
     except SimulationError:
         return None
     names = tuple(dict.fromkeys(s.record.name for s in judged))
@@ -64,7 +67,19 @@ def tried_out(result: SearchResult, laws: Callable[[Model], Collection[str]]) ->
     how = "falls" if after < before else "goes"
     fell = f"{how} from {before:.3g} to {after:.3g}" if changed else f"is {after:.3g}"
     text = f"On unseen data ({quantity(seconds, 's', 3)} of {shown}) the residual {fell} × noise."
+    seen = result.final.misfit.rms_validation
+    if after**2 - seen**2 > CRITERIA.lopsided_beyond:
+        text += f" That is more than the {seen:.3g} × of what was validated on, most of all in {_worst(judged, costs)}:"
+        text += " something acts there that was hardly seen; let such motion be fitted, too."
     return TriedOut(text, names, seconds, before, after)
+
+
+def _worst(segments: Sequence[Segments], costs: Sequence[Array]) -> str:
+    """Where most is left per value."""
+    most = [float(np.max(c / s.counted)) for s, c in zip(segments, costs, strict=True)]
+    i = int(np.argmax(most))
+    first = segments[i].first[np.argmax(costs[i] / segments[i].counted)]
+    return f"{segments[i].record.name} from {quantity(first * segments[i].record.dt, 's', 4)} on"
 
 
 def judged_alike(segments: Sequence[Segments], known: Sequence[Segments]) -> list[Segments]:
@@ -96,14 +111,18 @@ def with_laws(
     return without_outliers(at.point, at.columns, laws(smooth))
 
 
-def left_of(model: Model, segments: Sequence[Segments]) -> float:
-    """Residual over noise that a model leaves with the values that it has; only initial states are fitted.
+def costs_of(model: Model, segments: Sequence[Segments]) -> list[Array]:
+    """What a model leaves with the values that it has, (S_i,) per record; only initial states are fitted.
 
     :raises SimulationError: it does not run.
     """
     smooth = differentiable(model)
     at = Linearisation.of(smooth, all_fitted(segments))
-    costs = at.costs if smooth is model else left_rounded(at, model)
+    return at.costs if smooth is model else left_rounded(at, model)
+
+
+def over_noise(segments: Sequence[Segments], costs: Sequence[Array]) -> float:
+    """Residual over noise."""
     left, count = sum(float(c.sum()) for c in costs), sum(int(s.counted.sum()) for s in segments)
     return float(np.sqrt(left / max(count, 1)))
 
