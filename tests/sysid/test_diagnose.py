@@ -362,6 +362,20 @@ def test_a_model_that_a_fit_with_an_effect_led_out_of_a_local_minimum_is_searche
     assert done.added == []
 
 
+def test_a_quick_search_tries_one_effect_in_the_place_of_several_numbers_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def concluded(found: SearchResult, others: bool = True) -> None:
+        raise LookupError("with others" if others else "without")
+
+    search = Search.__new__(Search)
+    search.quick = True
+    stubs = {"searched": lambda: None, "rivals_begun_anew": lambda found: found, "concluded": concluded}
+    for name, stub in stubs.items():
+        monkeypatch.setattr(search, name, stub, raising=False)
+    monkeypatch.setattr("hydraulic_sysid.diagnosis.search.search.decisive", lambda found: found)
+    with pytest.raises(LookupError, match="with others"):
+        search.run()
+
+
 @pytest.mark.parametrize(
     ("left", "numbers", "sheet"),
     [
