@@ -173,13 +173,17 @@ class CandidateFits(Fitting):
                 doubted.append(state)
         return min(found, key=self.with_freedom, default=None)
 
-    def finish_two(self, base: SearchState, enough: Enough) -> tuple[SearchState | None, SearchState | None]:
+    def finish_two(
+        self, base: SearchState, enough: Enough, proxy: SearchState | None = None
+    ) -> tuple[SearchState | None, SearchState | None]:
         """A state with one more effect and its candidates, and one with two, that nearly all is explained by together.
 
         Each of two may hide what the other explains, so that neither explains a part alone, or segments do not agree on
         either. Beside the other each must be more than chance. None where they are not; a quick search leaves that out.
+
+        :param proxy: a state with one that explains a part, but less than something of any shape would
         """
-        on, doubted = self._doubted
+        on, doubted = self._doubted if proxy is None else (base, [proxy])
         # Rounding shows only once all else is right.
         doubted = [s for s in doubted if without_derivative(s.model) == without_derivative(base.model)]
         if self.quick or on is not base or not doubted:

@@ -320,13 +320,13 @@ class Search(RecordingFits):
                 if plain is not None:
                     return self.forward(self.recorded(plain))
             better = better if alone else None
-            needed = 0.0
+            needed, hidden, proxy = 0.0, None, None
             if better is not None and added:
                 needed = CRITERIA.nearly * self.share_of_a_curve(path[-1], better)
-                better = better if explained(path[-1].misfit, better.misfit) >= needed else None
-            hidden = None
+                if explained(path[-1].misfit, better.misfit) < needed:
+                    better, proxy = None, better
             if better is None and len(added) + 1 < CRITERIA.most_effects:
-                hidden, better = self.finish_two(path[-1], enough)
+                hidden, better = self.finish_two(path[-1], enough, proxy)
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
             doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= CRITERIA.nothing_left)
             loose = self.loose(path[-1]) if doubtful else None
