@@ -261,6 +261,7 @@ def test_a_further_effect_that_a_curve_beats_is_none(
     search.say, search.split, search.given = Progress(lambda _: None), Split([], []), model
     search.settings, search.faults, search.as_recorded = FitSettings(), [], None
     stubs = {
+        "shared_out": lambda state: False,
         "first_effect": lambda base: one,
         "finish": lambda base, enough: next(found),
         "fault_beside": lambda base, state, further, share: asked.append(share),
@@ -269,7 +270,7 @@ def test_a_further_effect_that_a_curve_beats_is_none(
         "finish_two": lambda *_: (None, None),
         **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
     }
-    for name, stub in {**stubs, "_curves": None}.items():
+    for name, stub in {**stubs, "_curves": None, "_shared_beside": False}.items():
         monkeypatch.setattr(search, name, stub, raising=False)
     place, times = "hydraulic_sysid.diagnosis.search.search", list[str]()
     # A curve over the time is the shape of no law.
@@ -325,7 +326,7 @@ def test_two_effects_that_hide_each_other_are_named_if_each_is_more_than_chance_
         "first_effect": lambda base: search.finish(base, enough), "share_of_a_curve": lambda *_: 0.0,
         "reviewed": lambda base, final, added, competing: (final, added, competing),
         **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
-        "fault_beside": lambda *_: None, "_last": None,
+        "fault_beside": lambda *_: None, "_last": None, "shared_out": lambda state: False,
     }  # fmt: skip
     for name, stub in stubs.items():
         monkeypatch.setattr(search, name, stub, raising=False)
@@ -336,6 +337,49 @@ def test_two_effects_that_hide_each_other_are_named_if_each_is_more_than_chance_
     assert list(done.misfits) == done.added
     search.quick = True
     assert search.forward(explored(fitted(model))).added == [], "a quick search leaves that out"
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_what_is_left_beside_an_effect_in_one_role_alone_is_shared_out_once(
+    model, first: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That may be the second effect, or a first one beside which nearly all that is left was not fitted."""
+    one, two = state(model.with_effect("valve_deadband"), 20000.0, {}), state(model, 9000.0, {})
+    two = replace(two, model=one.model.with_effect("load_spring"))
+    search, asked, again = Search.__new__(Search), list[SearchState](), list[object]()
+    search.say, search.split, search.given = Progress(lambda _: None), Split([], []), model
+
+    def shared_out(state: SearchState) -> bool:
+        asked.append(state)
+        return state is (one if first else two)
+
+    anew = [state(m, 1.0, {}) for m in (model, one.model)]
+    stubs = {
+        "first_effect": lambda base: one, "finish": lambda base, enough: two, "explore": lambda state, most: state,
+        "shared_out": shared_out, "_shared_beside": False, "_last": None, "_curves": None,
+        "state": lambda model, settings: anew[0] if model is base.model else anew[1],
+        "recorded": lambda state: again.append(state) or state,
+        "onward": lambda base, model, known: again.append(known) or "onward",
+        **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
+    }  # fmt: skip
+    for name, stub in stubs.items():
+        monkeypatch.setattr(search, name, stub, raising=False)
+    monkeypatch.setattr("hydraulic_sysid.diagnosis.search.search.borrowed", lambda *_: False)
+    base, forward = state(model, 60000.0, {}), search.forward
+    if first:  # the search goes on from the model without it, its faults and candidates looked for anew
+        monkeypatch.setattr(search, "forward", lambda base: "forward")
+    assert forward(base) == ("forward" if first else "onward")
+    assert again == [anew[0] if first else anew[1]]
+    assert asked == ([one] if first else [one, two])
+    asked.clear()
+
+    def goes_on(*_: object) -> float:
+        raise LookupError
+
+    monkeypatch.setattr(search, "share_of_a_curve", goes_on, raising=False)
+    with pytest.raises(LookupError):
+        forward(base)
+    assert asked == [], "once"
 
 
 @pytest.mark.parametrize("lower", [True, False])

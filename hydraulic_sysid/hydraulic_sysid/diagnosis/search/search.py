@@ -64,6 +64,8 @@ class Search(RecordingFits):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         self._judged_with: set[str] = set()
+        self._shared_beside = False
+        """Whether segments were shared out anew for what is left beside an effect."""
         self._in_time = task.say.within is not None
         self._curves: tuple[Linearisation, list[NonparametricCurve]] | None = None
 
@@ -320,6 +322,11 @@ class Search(RecordingFits):
                 if plain is not None:
                     return self.forward(self.recorded(plain))
             better = better if alone else None
+            # What is left beside an effect may be nearly all where nothing was fitted.
+            if better is not None and not self._shared_beside and self.shared_out(better):
+                self._shared_beside = True
+                known = self.state(path[-1].model, self._last)
+                return self.onward(base, base.model, known) if added else self.forward(self.recorded(known))
             needed, hidden, proxy = 0.0, None, None
             if better is not None and added:
                 needed = CRITERIA.nearly * self.share_of_a_curve(path[-1], better)
