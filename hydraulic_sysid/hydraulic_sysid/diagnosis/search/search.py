@@ -316,17 +316,12 @@ class Search(RecordingFits):
         while len(added) < CRITERIA.most_effects:
             enough = partial(worth_adding, base, path[-1], added) if added else partial(enough_at_first, base)
             better = self.finish(path[-1], enough) if added else self.first_effect(base)
-            alone = better is not None and not borrowed(path[-1], better, new_effect(better, path[-1]))
-            if better is not None and not added:
-                plain = self.led_on(base, better, alone)
-                if plain is not None:
-                    return self.forward(self.recorded(plain))
-            better = better if alone else None
-            # What is left beside an effect may be nearly all where nothing was fitted.
-            if better is not None and not self._shared_beside and self.shared_out(better):
-                self._shared_beside = True
-                known = self.state(path[-1].model, self._last)
-                return self.onward(base, base.model, known) if added else self.forward(self.recorded(known))
+            if better is not None:
+                alone = not borrowed(path[-1], better, new_effect(better, path[-1]))
+                elsewhere = self.begun_elsewhere(base, path[-1], better, alone)
+                if elsewhere is not None:
+                    return elsewhere
+                better = better if alone else None
             needed, hidden, proxy = 0.0, None, None
             if better is not None and added:
                 needed = CRITERIA.nearly * self.share_of_a_curve(path[-1], better)
@@ -371,11 +366,25 @@ class Search(RecordingFits):
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
 
-    def led_on(self, base: SearchState, better: SearchState, alone: bool) -> SearchState | None:
-        """The model without the effect of a ``better`` state, where that only led its fit out of a local minimum.
+    def begun_elsewhere(
+        self, base: SearchState, before: SearchState, better: SearchState, alone: bool
+    ) -> SearchResult | None:
+        """The search anew, where what a ``better`` state shows asks for that: of the model, or of the segments' roles.
 
-        ``alone``: whether the effect's gain is its own.
+        ``alone``: whether the gain of its effect over the state ``before`` is its own.
         """
+        first = not new_effects(before, base)
+        plain = self.led_on(base, better, alone) if first else None
+        # What is left beside an effect may be nearly all where nothing was fitted.
+        if plain is None and alone and not self._shared_beside and self.shared_out(better):
+            self._shared_beside = True
+            plain = self.state(before.model, self._last)
+        if plain is None:
+            return None
+        return self.forward(self.recorded(plain)) if first else self.onward(base, base.model, plain)
+
+    def led_on(self, base: SearchState, better: SearchState, alone: bool) -> SearchState | None:
+        """The model without the effect of a ``better`` state, where that only led its fit out of a local minimum."""
         without = better.model.without_effect(new_effect(better, base))
         plain = self.state(without, self._last) if not alone or self.leads_elsewhere(without, base) else base
         less = material(base.misfit, plain.misfit)
