@@ -19,7 +19,7 @@ from .frozen_jacobian import Refit, refit, refit_rounded
 from .linearisation import Linearisation
 from .misfit import explained, material, misfit
 from .score_test import CandidateScore, score
-from .search_state import CandidateRefit, SearchState
+from .search_state import CandidateRefit, SearchState, new_effect
 from .spectral_lines import record_features
 from .worth import Enough
 
@@ -189,7 +189,7 @@ class CandidateFits(Fitting):
         if self.quick or on is not base or not doubted:
             return None, None
         first = min(doubted, key=lambda s: s.misfit.total)
-        name = next(e for e in first.model.effects if e not in base.model.effects)
+        name = new_effect(first, base)
         self.say(f"what may hide beside {name}")
         first = self.explore(first, most=CRITERIA.later_refits)
         both = self.finish(first, enough)

@@ -21,7 +21,7 @@ from .criteria import CRITERIA
 from .data_sheet import Deviation, HeldNumbers, least_cost, relaxed, restored, stretched, with_error
 from .fitting import worse
 from .misfit import explained, reduction
-from .search_state import SearchResult, SearchState
+from .search_state import SearchResult, SearchState, new_effect
 from .spectral_lines import record_features
 from .stand_ins import StandIns
 from .uncertainty import parameter_errors
@@ -263,13 +263,3 @@ def _own(model: Model, name: str) -> dict[str, float]:
 
 def _names(states: Sequence[SearchState], before: SearchState) -> tuple[str, ...]:
     return tuple(new_effect(state, before) for state in states)
-
-
-def new_effect(state: SearchState, before: SearchState) -> str:
-    """The effect that a state has beyond another."""
-    return new_effects(state, before)[0]
-
-
-def new_effects(state: SearchState, before: SearchState) -> list[str]:
-    """All effects that a state has beyond another."""
-    return [e for e in state.model.effects if e not in before.model.effects]

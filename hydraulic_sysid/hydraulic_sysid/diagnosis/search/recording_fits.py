@@ -12,14 +12,14 @@ from hydraulic_sim.model import Model
 
 from .criteria import CRITERIA
 from .data_sheet import relaxed, restored
-from .data_sheet_fits import DataSheetFits, new_effect
+from .data_sheet_fits import DataSheetFits
 from .drive_faults import costs_with
 from .fitting import Task, worse
 from .holdout import Split
 from .misfit import explained, material, misfit
 from .recording_faults import RecordingFault, other_gains, recording_faults, resized
 from .remainder import negligible
-from .search_state import FaultFit, SearchResult, SearchState, Together
+from .search_state import FaultFit, SearchResult, SearchState, Together, new_effect
 from .worth import enough_at_first, leaves_most
 
 

@@ -27,7 +27,6 @@ from .candidates import candidates
 from .competing_models import competing_models, nearest, told_apart
 from .criteria import CRITERIA
 from .data_sheet import restored, tolerances
-from .data_sheet_fits import new_effect, new_effects
 from .drift import drift
 from .errors import DiagnosisError
 from .fitting import Task, quieter, retimed, spiked
@@ -41,7 +40,7 @@ from .profile_likelihood import with_profiles
 from .progress import OutOfTimeError
 from .recording_fits import RecordingFits
 from .score_test import CandidateScore, score
-from .search_state import CandidateRefit, SearchResult, SearchState
+from .search_state import CandidateRefit, SearchResult, SearchState, new_effect, new_effects
 from .set_aside import accidents
 from .spectral_lines import record_features
 from .uncertainty import Known, parameter_errors

@@ -180,3 +180,13 @@ def loud(segments: Segments) -> Array:
     """(C,) root mean square over the segments of what is new in each sample's noise [SI]."""
     innovation = np.array([n.innovation for n in segments.noise])
     return np.asarray(innovation * np.sqrt(np.mean(segments.loudness**2, axis=0)))
+
+
+def new_effect(state: SearchState, before: SearchState) -> str:
+    """The effect that a state has beyond another."""
+    return new_effects(state, before)[0]
+
+
+def new_effects(state: SearchState, before: SearchState) -> list[str]:
+    """All effects that a state has beyond another."""
+    return [e for e in state.model.effects if e not in before.model.effects]

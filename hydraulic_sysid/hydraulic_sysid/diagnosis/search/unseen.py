@@ -76,10 +76,10 @@ def tried_out(result: SearchResult, laws: Callable[[Model], Collection[str]]) ->
 
 def _worst(segments: Sequence[Segments], costs: Sequence[Array]) -> str:
     """Where most is left per value."""
-    most = [float(np.max(c / s.counted)) for s, c in zip(segments, costs, strict=True)]
-    i = int(np.argmax(most))
-    first = segments[i].first[np.argmax(costs[i] / segments[i].counted)]
-    return f"{segments[i].record.name} from {quantity(first * segments[i].record.dt, 's', 4)} on"
+    left = [c / s.counted for s, c in zip(segments, costs, strict=True)]
+    own, worst = max(zip(segments, left, strict=True), key=lambda pair: float(pair[1].max()))
+    first = own.first[np.argmax(worst)]
+    return f"{own.record.name} from {quantity(first * own.record.dt, 's', 4)} on"
 
 
 def judged_alike(segments: Sequence[Segments], known: Sequence[Segments]) -> list[Segments]:
