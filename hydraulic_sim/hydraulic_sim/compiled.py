@@ -6,10 +6,11 @@ The text's folder is named after all that it rests on: itself, every effect file
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
-from numba import types
+from numba import njit, types
 
 from hydraulic_node_utils import generated_code
 
@@ -48,7 +49,7 @@ class CompiledPlant:
 def _load(library: Library) -> ModuleType:
     rests_on = (library.fingerprint, *(Path(f).read_text(encoding="utf-8") for f in (kernels.__file__, __file__)))
     functions = {
-        f"{effect.name}.{which}": function
+        f"{effect.name}.{which}": _inner(function)
         for effect in library.values()
         for which, function in effect.functions().items()
     }
@@ -58,6 +59,12 @@ def _load(library: Library) -> ModuleType:
         raise
     except Exception as error:
         raise EffectError(_complaint(library, error)) from error
+
+
+@lru_cache(maxsize=512)
+def _inner(function: Callable) -> Callable:
+    """An effect's function, compiled once for all libraries that have it."""
+    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
 def _complaint(library: Library, error: Exception) -> str:

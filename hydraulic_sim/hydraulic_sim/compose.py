@@ -249,9 +249,7 @@ def places(layout: Layout) -> dict[str, object]:
 def write_module(library: Library) -> str:
     """The text of the module for this library: `rhs` and `run` (see `plant` for how they are called)."""
     functions = "\n".join(
-        f'{e.name}__{which} = njit(FUNCTIONS["{e.name}.{which}"], error_model="numpy")'
-        for e in library.values()
-        for which in e.functions()
+        f'{e.name}__{which} = FUNCTIONS["{e.name}.{which}"]' for e in library.values() for which in e.functions()
     )
     return fill(MODULE, functions=functions, **places(Layout(library)))
 

@@ -7,6 +7,7 @@ whatever changes what is computed changes the folder.
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import hashlib
 import importlib.util
 import os
@@ -15,7 +16,8 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -26,6 +28,8 @@ from numba.core.errors import NumbaError
 from hydraulic_node_utils.whole_file import write_text
 
 CACHE_VARIABLE = "HYDRAULIC_SIM_CACHE"
+_PATIENCE_S = 120.0  # with another process that compiles the same
+_LOOK_S = 0.05
 
 
 def cache_root() -> Path:
@@ -103,5 +107,25 @@ def _execute(file: Path, text: str, functions: Mapping[str, Callable]) -> Module
     module = importlib.util.module_from_spec(spec)
     module.__dict__["FUNCTIONS"] = dict(functions)
     sys.modules[spec.name] = module  # numba finds cached code again by the module's name
-    spec.loader.exec_module(module)
+    with _alone(file.parent):
+        spec.loader.exec_module(module)
     return module
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """While no other process compiles into this folder, so that what several need at once is compiled by one of them.
+
+    Where files cannot be locked, or the other one takes very long, without waiting.
+    """
+    with contextlib.ExitStack() as opened:
+        with contextlib.suppress(OSError):
+            lock = opened.enter_context((folder / "lock").open("w"))
+            until = time.monotonic() + _PATIENCE_S
+            while time.monotonic() < until:
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except BlockingIOError:
+                    time.sleep(_LOOK_S)
+        yield
