@@ -178,10 +178,11 @@ class DataSheetFits(CandidateFits):
     def sheet_instead(self, base: SearchState, better: SearchState, loose: SearchState) -> bool:
         """Whether other numbers of the data sheet leave less than one more effect does.
 
-        Where both leave the same but for what laws found before are right to, no more of them than that effect has.
+        Where both leave the same, but for what counts or what laws found before are right to, no more of them than that
+        effect has.
         """
         free = [k for k in better.model.movable_keys() if k not in loose.model.movable_keys()]
-        spared = CRITERIA.law_elsewhere * max(base.misfit.total - loose.misfit.total, 0.0)
+        spared = max(CRITERIA.law_elsewhere * (base.misfit.total - loose.misfit.total), better.misfit.least)
         if abs(better.misfit.total - loose.misfit.total) >= spared:
             return loose.misfit.total < better.misfit.total
         return len(self.fewest_moved(loose, None, spared)[1]) <= len(free)

@@ -329,8 +329,7 @@ class Search(RecordingFits):
             if better is None and len(added) + 1 < CRITERIA.most_effects:
                 hidden, better = self.finish_two(path[-1], enough, proxy)
             # What is left beside an effect may be wrong numbers, which another effect would only imitate.
-            doubtful = bool(added) and (better is None or better.misfit.variance - 1.0 >= CRITERIA.nothing_left)
-            loose = self.loose(path[-1]) if doubtful else None
+            loose = self.loose(path[-1]) if added else None
             if loose is not None and (better is None or self.sheet_instead(base, better, loose)):
                 loose, model = self.judged(loose), loose.model
                 for name in added:
