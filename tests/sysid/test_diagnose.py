@@ -421,25 +421,54 @@ def test_a_quick_search_tries_one_effect_in_the_place_of_several_numbers_too(mon
 
 
 @pytest.mark.parametrize(
-    ("left", "numbers", "sheet"),
+    ("before", "left", "numbers", "sheet"),
     [
-        (20000.0, 1, False),  # it leaves clearly less
-        (40000.0, 3, True),
-        (29900.0, 1, True),  # … or less by what laws are right to: one number is likelier than an effect
-        (29900.0, 2, False),  # of one parameter, and two are not
-        (30100.0, 2, False),
+        (900000.0, 20000.0, 1, False),  # it leaves clearly less
+        (900000.0, 40000.0, 3, True),
+        (900000.0, 29900.0, 1, True),  # … or less by what laws are right to: one number is likelier than an effect
+        (900000.0, 29900.0, 2, False),  # of one parameter, and two are not
+        (900000.0, 30100.0, 2, False),
+        (40000.0, 30200.0, 1, True),  # … or by less than what counts
+        (40000.0, 30200.0, 2, False),
+        (40000.0, 30300.0, 2, True),
     ],
 )
 def test_of_an_effect_and_other_numbers_that_leave_as_much_the_fewer_are_taken(
-    model, left: float, numbers: int, sheet: bool, monkeypatch: pytest.MonkeyPatch
+    model, before: float, left: float, numbers: int, sheet: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    base, loose = state(model, 900000.0, {}), state(model, 30000.0, {})
+    base, loose = state(model, before, {}), state(model, 30000.0, {})
     asked: list[float] = []
     fits = object.__new__(Search)
     moved = [SimpleNamespace(key=str(i)) for i in range(numbers)]
     monkeypatch.setattr(Search, "fewest_moved", lambda self, *given: asked.append(given[2]) or (loose, moved))
     assert fits.sheet_instead(base, state(model.with_effect("constant_load"), left, {}), loose) is sheet
-    assert asked == [pytest.approx(CRITERIA.law_elsewhere * 870000.0)] * (abs(left - 30000.0) < 435.0)
+    least = max(CRITERIA.law_elsewhere * (before - 30000.0), at(left).least)
+    assert asked == [pytest.approx(least)] * (abs(left - 30000.0) < least)
+
+
+@pytest.mark.parametrize("wrong", [True, False])
+def test_other_numbers_are_tried_against_a_further_effect_that_leaves_nothing_too(
+    model, wrong: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Records of the position alone have no other way to tell a load from wrong areas."""
+    one, two = state(model.with_effect("valve_hysteresis"), 14000.0, {}), state(model, 1000.0, {})
+    two, loose = replace(two, model=one.model.with_effect("constant_load")), state(one.model, 1000.0, {})
+    search, found = Search.__new__(Search), iter([two, None])
+    search.say, search.split, search.given = Progress(lambda _: None), Split([], []), model
+    search.settings, search.faults, search.as_recorded, search.quick = FitSettings(), [], None, False
+    stubs = {
+        "first_effect": lambda base: one, "finish": lambda base, enough: next(found),
+        "explore": lambda state, most: state, "loose": lambda state: loose, "judged": lambda state: state,
+        "sheet_instead": lambda *given: given[1:] == (two, loose) and wrong,
+        "onward": lambda base, model, known: known, "share_of_a_curve": lambda *_: 0.0,
+        "nothing_left": lambda state: state is two, "reviewed": lambda base, final, added, known: (final, added, known),
+        **{name: lambda *_: None for name in ("begun_elsewhere", "judged_anew", "fault_beside")},
+    }  # fmt: skip
+    for name, stub in stubs.items():
+        monkeypatch.setattr(search, name, stub, raising=False)
+    monkeypatch.setattr("hydraulic_sysid.diagnosis.search.search.borrowed", lambda *_: False)
+    done = search.forward(state(model, 60000.0, {}))
+    assert done is loose if wrong else list(done.misfits) == ["valve_hysteresis", "constant_load"]
 
 
 @pytest.mark.parametrize(
