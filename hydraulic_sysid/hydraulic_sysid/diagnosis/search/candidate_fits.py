@@ -51,11 +51,10 @@ class CandidateFits(Fitting):
 
         A noise estimated from what the model leaves has the small effects that it lacks in it. A prediction from the
         sensitivities alone often falls far short of what a fit gains (47 of 980, for a little air in the oil), so no
-        more is asked than would count at all. A quick search leaves that out.
+        more is asked than would count at all.
         """
-        nothing = state.misfit.variance - 1.0 < CRITERIA.nothing_left
-        if self.quick or not nothing:
-            return nothing
+        if state.misfit.variance - 1.0 >= CRITERIA.nothing_left:
+            return False
         self.say("looking for what may pass for noise")
         return not any(s.reduction > state.misfit.least and not observed(s.effect) for s in self.scores(state))
 
