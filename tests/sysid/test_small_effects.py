@@ -51,6 +51,8 @@ def test_what_passes_for_noise_is_still_promised_by_its_effect(model: Model, hid
     base = looked.judged(looked.state(looked.given))
     assert base.misfit.variance - 1.0 < CRITERIA.nothing_left, "by the noise alone nothing is left of either"
     assert looked.nothing_left(base) is nothing
+    looked.quick = True
+    assert looked.nothing_left(base) is nothing, "a quick diagnosis looks for it, too"
 
 
 def test_a_load_that_the_file_does_not_know_is_found_beyond_its_bound(model: Model) -> None:
