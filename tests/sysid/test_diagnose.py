@@ -382,6 +382,19 @@ def test_what_is_left_beside_an_effect_in_one_role_alone_is_shared_out_once(
     assert asked == [], "once"
 
 
+def test_roles_are_not_shared_out_anew_beside_an_effect_that_leaves_nothing(
+    model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search, asked = Search.__new__(Search), list[SearchState]()
+    one, base = state(model.with_effect("valve_deadband"), 9000.0, {}), state(model, 60000.0, {})
+    monkeypatch.setattr(search, "_shared_beside", False, raising=False)
+    monkeypatch.setattr(search, "shared_out", lambda state: asked.append(state))
+    for left in (3012.0, 3024.0):
+        two = replace(state(model, left, {}), model=one.model.with_effect("sensor_quantisation"))
+        assert search.begun_elsewhere(base, one, two, True) is None
+    assert [round(s.misfit.total) for s in asked] == [3024]
+
+
 @pytest.mark.parametrize("lower", [True, False])
 def test_a_model_that_a_fit_with_an_effect_led_out_of_a_local_minimum_is_searched_anew(
     model, lower: bool, monkeypatch: pytest.MonkeyPatch

@@ -374,7 +374,8 @@ class Search(RecordingFits):
         first = not new_effects(before, base)
         plain = self.led_on(base, better, alone) if first else None
         # What is left beside an effect may be nearly all where nothing was fitted.
-        if plain is None and alone and not self._shared_beside and self.shared_out(better):
+        left = better.misfit.variance - 1.0 >= CRITERIA.nothing_left
+        if plain is None and alone and left and not self._shared_beside and self.shared_out(better):
             self._shared_beside = True
             plain = self.state(before.model, self._last)
         if plain is None:
