@@ -267,7 +267,7 @@ def test_a_further_effect_that_a_curve_beats_is_none(
         "fault_beside": lambda base, state, further, share: asked.append(share),
         "explore": lambda state, most: state,
         "reviewed": lambda base, final, added, competing: (final, added, competing),
-        "finish_two": lambda *_: (None, None),
+        "finish_two": lambda *_: [],
         **{name: lambda *_: None for name in ("loose", "judged_anew", "leads_elsewhere", "nothing_left")},
     }
     for name, stub in {**stubs, "_curves": None, "_shared_beside": False}.items():
@@ -407,7 +407,7 @@ def test_a_model_that_a_fit_with_an_effect_led_out_of_a_local_minimum_is_searche
     search.settings, search.faults, search.as_recorded = FitSettings(), [], None
     seen: list[SearchState] = []
     stubs = {
-        "state": lambda *_: plain, "first_effect": lambda base: next(found), "finish_two": lambda *_: (None, None),
+        "state": lambda *_: plain, "first_effect": lambda base: next(found), "finish_two": lambda *_: [],
         "recorded": lambda state: seen.append(state) or state, "leads_elsewhere": lambda *_: False, "_last": None,
     }  # fmt: skip
     for name, stub in stubs.items():

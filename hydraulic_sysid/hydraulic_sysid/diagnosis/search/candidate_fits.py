@@ -174,11 +174,11 @@ class CandidateFits(Fitting):
 
     def finish_two(
         self, base: SearchState, enough: Enough, proxy: SearchState | None = None
-    ) -> tuple[SearchState | None, SearchState | None]:
+    ) -> list[SearchState]:
         """A state with one more effect and its candidates, and one with two, that nearly all is explained by together.
 
         Each of two may hide what the other explains, so that neither explains a part alone, or segments do not agree on
-        either. Beside the other each must be more than chance. None where they are not; a quick search leaves that out.
+        either. Beside the other each must be more than chance. Else there is none; a quick search leaves that out.
 
         :param proxy: a state with one that explains a part, but less than something of any shape would
         """
@@ -186,19 +186,19 @@ class CandidateFits(Fitting):
         # Rounding shows only once all else is right.
         doubted = [s for s in doubted if without_derivative(s.model) == without_derivative(base.model)]
         if self.quick or on is not base or not doubted:
-            return None, None
+            return []
         first = min(doubted, key=lambda s: s.misfit.total)
         name = new_effect(first, base)
         self.say(f"what may hide beside {name}")
         first = self.explore(first, most=CRITERIA.later_refits)
         both = self.finish(first, enough)
         if both is None or explained(base.misfit, both.misfit) < CRITERIA.nearly:
-            return None, None
+            return []
         with suppress(SimulationError):  # it does not run without it
             other = self.state(both.model.without_effect(name), self._last)
             if self.better(other, both):
-                return first, both
-        return None, None
+                return [first, both]
+        return []
 
     def with_freedom(self, state: SearchState) -> float:
         """What a state leaves and what its free parameters are worth: of two that leave the same the simpler is taken.

@@ -313,48 +313,24 @@ class Search(RecordingFits):
         if known is not None and known.misfit.variance - 1.0 > CRITERIA.nothing_left:
             path[-1] = self.explore(known, most=CRITERIA.later_refits)
         while len(added) < CRITERIA.most_effects:
-            enough = partial(worth_adding, base, path[-1], added) if added else partial(enough_at_first, base)
-            better = self.finish(path[-1], enough) if added else self.first_effect(base)
-            if better is not None:
-                alone = not borrowed(path[-1], better, new_effect(better, path[-1]))
-                elsewhere = self.begun_elsewhere(base, path[-1], better, alone)
-                if elsewhere is not None:
-                    return elsewhere
-                better = better if alone else None
-            needed, hidden, proxy = 0.0, None, None
-            if better is not None and added:
-                needed = CRITERIA.nearly * self.share_of_a_curve(path[-1], better)
-                if explained(path[-1].misfit, better.misfit) < needed:
-                    better, proxy = None, better
-            if better is None and len(added) + 1 < CRITERIA.most_effects:
-                hidden, better = self.finish_two(path[-1], enough, proxy)
-            # What is left beside an effect may be wrong numbers, which another effect would only imitate.
-            loose = self.loose(path[-1]) if added else None
-            if loose is not None and (better is None or self.sheet_instead(base, better, loose)):
-                loose, model = self.judged(loose), loose.model
-                for name in added:
-                    model = model.without_effect(name)
-                return self.onward(base, model, loose)
-            mended = self.fault_beside(base, path[-1], better, needed) if added else None
-            if mended is not None:
-                return self.onward(base, base.model, mended)
-            if better is None:
+            states = self.step(base, path[-1], added)
+            if not isinstance(states, list):
+                return states
+            if not states:
                 break
-            if hidden is not None:
-                added.append(new_effect(hidden, path[-1]))
-                path.append(hidden)
-            added.append(new_effect(better, path[-1]))
-            self.path = [*path, better]
+            for state in states:
+                added.append(new_effect(state, path[-1]))
+                path.append(state)
+            self.path, better = list(path), path[-1]
             self.say.reached(added, better.misfit)
             last = len(added) == CRITERIA.most_effects and explained(base.misfit, better.misfit) > CRITERIA.nearly
             # What was judged by a model that lacked it would ask for further effects.
             again = None if last or better.misfit.variance >= CRITERIA.far_off else self.judged_anew(better)
             if again is not None:
                 return self.onward(base, base.model, again)
-            nothing = self.nothing_left(better)
-            path.append(better if nothing or last else self.explore(better, most=CRITERIA.later_refits))
-            if nothing:
+            if self.nothing_left(better):
                 break
+            path[-1] = better if last else self.explore(better, most=CRITERIA.later_refits)
         final, competing = path[-1], {added[-1]: path[-2]} if added and known is None else {}
         misfits = {name: state.misfit for name, state in zip(added, path[1:], strict=False)}
         if len(added) > 1 or known is not None:
@@ -363,6 +339,48 @@ class Search(RecordingFits):
                 misfits = self._misfits(base, final, kept, competing)
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
+
+    def step(
+        self, base: SearchState, state: SearchState, added: Sequence[str]
+    ) -> SearchResult | list[SearchState]:
+        """What comes after a ``state``: one with a further effect, or two of which each hides the other, or none.
+
+        Where something else explains what is left, the search anew from there.
+        """
+        enough = partial(worth_adding, base, state, added) if added else partial(enough_at_first, base)
+        better = self.finish(state, enough) if added else self.first_effect(base)
+        if better is not None:
+            alone = not borrowed(state, better, new_effect(better, state))
+            elsewhere = self.begun_elsewhere(base, state, better, alone)
+            if elsewhere is not None:
+                return elsewhere
+            better = better if alone else None
+        states, needed, proxy = [better] if better is not None else [], 0.0, None
+        if better is not None and added:
+            needed = CRITERIA.nearly * self.share_of_a_curve(state, better)
+            if explained(state.misfit, better.misfit) < needed:
+                states, proxy = [], better
+        if not states and len(added) + 1 < CRITERIA.most_effects:
+            states = self.finish_two(state, enough, proxy)
+        otherwise = self.otherwise(base, state, states[-1] if states else None, needed) if added else None
+        return states if otherwise is None else otherwise
+
+    def otherwise(
+        self, base: SearchState, state: SearchState, better: SearchState | None, needed: float
+    ) -> SearchResult | None:
+        """The search anew from a ``state`` with other numbers, or a fault, that explain what a ``better`` one does.
+
+        ``needed``: share of what is left, that a fault must explain.
+        """
+        # What is left beside an effect may be wrong numbers, which another effect would only imitate.
+        loose = self.loose(state)
+        if loose is not None and (better is None or self.sheet_instead(base, better, loose)):
+            loose, model = self.judged(loose), loose.model
+            for name in new_effects(state, base):
+                model = model.without_effect(name)
+            return self.onward(base, model, loose)
+        mended = self.fault_beside(base, state, better, needed)
+        return None if mended is None else self.onward(base, base.model, mended)
 
     def begun_elsewhere(
         self, base: SearchState, before: SearchState, better: SearchState, alone: bool
