@@ -1,9 +1,11 @@
-"""Where compiled physics is kept when the user's own folder cannot be written to."""
+"""Where compiled physics is kept, and that of several processes one compiles it."""
 
 from __future__ import annotations
 
+import fcntl
 import os
 import tempfile
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -39,3 +41,27 @@ def test_a_folder_that_others_can_write_to_is_not_used(place: Path) -> None:
     root = generated_code.cache_root()
     assert root != taken and root.parent == place
     assert root.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("patience", [60.0, 0.0])
+def test_what_another_process_compiles_is_waited_for(
+    patience: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But not for ever: that process may have been stopped."""
+    monkeypatch.setenv(generated_code.CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setattr(generated_code, "_PATIENCE_S", patience)
+    text, loaded = "NUMBER = 7\n", list[int]()
+    folder = generated_code.place("seven", text, ()).parent
+    folder.mkdir()
+
+    def load() -> None:
+        loaded.append(generated_code.load("seven", text, (), {}).NUMBER)
+
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        loading = threading.Thread(target=load)
+        loading.start()
+        loading.join(0.5 if patience else 60.0)
+        assert loaded == ([] if patience else [7])
+    loading.join(60.0)
+    assert loaded == [7]
