@@ -454,9 +454,24 @@ def test_of_an_effect_and_other_numbers_that_leave_as_much_the_fewer_are_taken(
     fits = object.__new__(Search)
     moved = [SimpleNamespace(key=str(i)) for i in range(numbers)]
     monkeypatch.setattr(Search, "fewest_moved", lambda self, *given: asked.append(given[2]) or (loose, moved))
+    monkeypatch.setattr(fits, "_last", None, raising=False)
+    monkeypatch.setattr(Search, "state", lambda self, *_: loose)
     assert fits.sheet_instead(base, state(model.with_effect("constant_load"), left, {}), loose) is sheet
     least = max(CRITERIA.law_elsewhere * (before - 30000.0), at(left).least)
     assert asked == [pytest.approx(least)] * (abs(left - 30000.0) < least)
+
+
+@pytest.mark.parametrize(("again", "sheet"), [(29100.0, True), (29900.0, False)])
+def test_other_numbers_that_are_a_little_behind_are_fitted_once_more(
+    model, again: float, sheet: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All numbers of a sheet say much the same, and a fit along that goes on for long."""
+    fits, base = object.__new__(Search), state(model, 900000.0, {})
+    loose, better = state(model, 30000.0, {}), state(model.with_effect("constant_load"), 29000.0, {})
+    monkeypatch.setattr(fits, "_last", None, raising=False)
+    monkeypatch.setattr(Search, "state", lambda self, *_: state(model, again, {}))
+    monkeypatch.setattr(Search, "fewest_moved", lambda self, final, *_: (final, [None]))
+    assert fits.sheet_instead(base, better, loose) is sheet
 
 
 @pytest.mark.parametrize("wrong", [True, False])

@@ -183,8 +183,12 @@ class DataSheetFits(CandidateFits):
         """
         free = [k for k in better.model.movable_keys() if k not in loose.model.movable_keys()]
         spared = max(CRITERIA.law_elsewhere * (base.misfit.total - loose.misfit.total), better.misfit.least)
-        if abs(better.misfit.total - loose.misfit.total) >= spared:
-            return loose.misfit.total < better.misfit.total
+        behind = loose.misfit.total - better.misfit.total
+        if spared <= behind < CRITERIA.rough * (base.misfit.total - loose.misfit.total):  # it may have stopped short
+            loose = min(loose, self.state(loose.model, self._last), key=lambda s: s.misfit.total)
+            behind = loose.misfit.total - better.misfit.total
+        if abs(behind) >= spared:
+            return behind < 0.0
         return len(self.fewest_moved(loose, None, spared)[1]) <= len(free)
 
     def deviation(self, held: HeldNumbers, key: str, moved: Sequence[str], state: SearchState) -> Deviation:
