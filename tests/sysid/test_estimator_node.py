@@ -136,7 +136,14 @@ def test_the_topics_carry_what_the_pure_parts_make_of_the_states(bench: Bench, t
 def test_every_prediction_is_that_of_the_coefficients_before_it(bench: Bench) -> None:
     """From the states alone: sampled as a record is, times the coefficients that were published last."""
     bench.start("-p", "sampling_time:=0.02", "-p", "na:=2", "-p", "nb:=2")
-    bench.coefficients(60)
+    compared = 0
+    while compared <= 20:  # a busy machine loses states, and three periods in a row have to be whole
+        bench.coefficients(30)
+        compared = predictions(bench)
+
+
+def predictions(bench: Bench) -> int:
+    """Compares what was predicted wherever all that it rests on has been heard; how many there were."""
     coefficients = {from_time(m.header.stamp): np.array(m.position) for m in list(bench.heard["model_parameters"])}
     fits = {from_time(m.header.stamp): m for m in list(bench.heard["model_fit"])}
     states = {from_time(m.header.stamp): sample_from_messages(m) for m in list(bench.states)}
@@ -154,7 +161,7 @@ def test_every_prediction_is_that_of_the_coefficients_before_it(bench: Bench) ->
             assert fit.position[0] == pytest.approx(coefficients[past[1]] @ regressor, abs=1e-9)
             assert fit.velocity[0] == pytest.approx(slow[stamp][1] - fit.position[0], abs=1e-9)
             compared += 1
-    assert compared > 20
+    return compared
 
 
 def test_it_can_be_told_to_learn_anew_and_to_forget_faster(bench: Bench) -> None:
