@@ -26,12 +26,7 @@ def test_a_shipped_excerpt_is_small_and_says_whose_it_is(name: str) -> None:
     assert {"LICENSE", "README.md"} <= {path.name for path in files}
 
 
-THOROUGH = "bam"  # an excerpt that compiles every place of the plant where something unknown may act
-
-
-@pytest.fixture(
-    scope="module", params=[pytest.param(n, marks=pytest.mark.thorough) if n == THOROUGH else n for n in SHIPPED]
-)
+@pytest.fixture(scope="module", params=SHIPPED)
 def studied(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path, int]:
     """Name of a set, the folder of the results, and the exit code of the command."""
     out = tmp_path_factory.mktemp(request.param)
