@@ -53,7 +53,7 @@ class CandidateFits(Fitting):
         sensitivities alone often falls far short of what a fit gains (47 of 980, for a little air in the oil), so no
         more is asked than would count at all.
         """
-        if state.misfit.variance - 1.0 >= CRITERIA.nothing_left:
+        if not state.misfit.at_the_noise:
             return False
         self.say("looking for what may pass for noise")
         return not any(s.reduction > state.misfit.least and not observed(s.effect) for s in self.scores(state))
@@ -172,9 +172,7 @@ class CandidateFits(Fitting):
                 doubted.append(state)
         return min(found, key=self.with_freedom, default=None)
 
-    def finish_two(
-        self, base: SearchState, enough: Enough, proxy: SearchState | None = None
-    ) -> list[SearchState]:
+    def finish_two(self, base: SearchState, enough: Enough, proxy: SearchState | None = None) -> list[SearchState]:
         """A state with one more effect and its candidates, and one with two, that nearly all is explained by together.
 
         Each of two may hide what the other explains, so that neither explains a part alone, or segments do not agree on

@@ -182,9 +182,10 @@ class DataSheetFits(CandidateFits):
         effect has.
         """
         free = [k for k in better.model.movable_keys() if k not in loose.model.movable_keys()]
-        spared = max(CRITERIA.law_elsewhere * (base.misfit.total - loose.misfit.total), better.misfit.least)
+        found = base.misfit.total - loose.misfit.total
+        spared = max(CRITERIA.law_elsewhere * found, better.misfit.least)
         behind = loose.misfit.total - better.misfit.total
-        if spared <= behind < CRITERIA.rough * (base.misfit.total - loose.misfit.total):  # it may have stopped short
+        if spared <= behind < CRITERIA.rough * found:  # it may have stopped short
             loose = min(loose, self.state(loose.model, self._last), key=lambda s: s.misfit.total)
             behind = loose.misfit.total - better.misfit.total
         if abs(behind) >= spared:

@@ -235,7 +235,7 @@ class Fitting:
         A model that lacks an effect is bent to imitate it, often up to bounds, and once the effect is there a fit from
         such values may end in a local minimum.
         """
-        if state.misfit.variance - 1.0 < CRITERIA.nothing_left:
+        if state.misfit.at_the_noise:
             return state
         filed = self.with_filed_values(state.model)
         try:

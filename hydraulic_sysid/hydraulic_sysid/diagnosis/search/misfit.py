@@ -94,6 +94,11 @@ class Misfit:
         return self.usual <= CRITERIA.little**2
 
     @property
+    def at_the_noise(self) -> bool:
+        """Whether by the noise nothing is left; what that was estimated from may hide more."""
+        return self.variance - 1.0 < CRITERIA.nothing_left
+
+    @property
     def least(self) -> float:
         """The smallest reduction of the sum of squares that counts."""
         return max(CRITERIA.significant, CRITERIA.visible * self.count) * self.variance

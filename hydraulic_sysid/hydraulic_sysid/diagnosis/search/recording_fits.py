@@ -108,7 +108,7 @@ class RecordingFits(DataSheetFits):
 
         :param share: of what is left, that it must explain
         """
-        nothing = further is None and state.misfit.variance - 1.0 < CRITERIA.nothing_left
+        nothing = further is None and state.misfit.at_the_noise
         if nothing or self._assumed == CRITERIA.most_faults:
             return None
         self.say("faults of the recording")
@@ -151,7 +151,7 @@ class RecordingFits(DataSheetFits):
                 if base.misfit.fit - state.misfit.fit >= least:
                     state = self.begun_anew(state)
                 tried.append((sized, state, self.split))
-                if state.misfit.variance - 1.0 < CRITERIA.nothing_left:
+                if state.misfit.at_the_noise:
                     break
             fault, state, self.split = min(tried, key=lambda one: one[1].misfit.total)
             for _ in range(CRITERIA.most_sizes if base.misfit.fit - state.misfit.fit >= least else 0):

@@ -310,7 +310,7 @@ class Search(RecordingFits):
         """Forward from the base or from what is ``known``, backward, and every effect added against its competitors."""
         path = [base] if known is None else [base, known]
         added, self.path = new_effects(path[-1], base), path
-        if known is not None and known.misfit.variance - 1.0 > CRITERIA.nothing_left:
+        if known is not None and not known.misfit.at_the_noise:
             path[-1] = self.explore(known, most=CRITERIA.later_refits)
         while len(added) < CRITERIA.most_effects:
             states = self.step(base, path[-1], added)
@@ -340,9 +340,7 @@ class Search(RecordingFits):
         found = SearchResult(self.given, self.split, self.settings, base, final, misfits, competing)
         return replace(found, faults=tuple(self.faults), as_recorded=self.as_recorded)
 
-    def step(
-        self, base: SearchState, state: SearchState, added: Sequence[str]
-    ) -> SearchResult | list[SearchState]:
+    def step(self, base: SearchState, state: SearchState, added: Sequence[str]) -> SearchResult | list[SearchState]:
         """What comes after a ``state``: one with a further effect, or two of which each hides the other, or none.
 
         Where something else explains what is left, the search anew from there.
@@ -392,8 +390,8 @@ class Search(RecordingFits):
         first = not new_effects(before, base)
         plain = self.led_on(base, better, alone) if first else None
         # What is left beside an effect may be nearly all where nothing was fitted.
-        left = better.misfit.variance - 1.0 >= CRITERIA.nothing_left
-        if plain is None and alone and left and not self._shared_beside and self.shared_out(better):
+        shares = alone and not (better.misfit.at_the_noise or self._shared_beside)
+        if plain is None and shares and self.shared_out(better):
             self._shared_beside = True
             plain = self.state(before.model, self._last)
         if plain is None:
