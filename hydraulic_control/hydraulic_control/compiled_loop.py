@@ -25,7 +25,8 @@ def physical(
     now, failure = np.empty((1, columns)), np.zeros(2)
     limit = law[0].drive_limit
     for i in range(len(wanted)):
-        if run(u, dt, (first + i) * dt, longest, turn, on, parameters, hydraulic, x, memory, now, failure) < 1:
+        at = (first + i) * dt
+        if run(u, dt, at, now, 0, longest, turn, on, parameters, hydraulic, x, memory, now, failure) < 1:
             return i
         out[i, 0], out[i, 1] = now[0, TRUE_POSITION], u[0]
         seen = now[0, POSITION] + noise[i, 0]

@@ -20,15 +20,17 @@ from .compose import Layout, write_module
 from .errors import EffectError
 from .registry import Library
 
+_NUMBER, _BYTE = types.float64, types.uint8
+_LINE, _TABLE = types.float64[::1], types.float64[:, ::1]
 RUN = types.int64(
-    types.float64[::1], *[types.float64] * 4, types.uint8[::1], types.float64[::1], types.uint8, types.float64[::1],
-    types.float64[::1], types.float64[:, ::1], types.float64[::1],
+    _LINE, _NUMBER, _NUMBER, _TABLE, types.int64, _NUMBER, _NUMBER, _BYTE[::1], _LINE, _BYTE, _LINE, _LINE, _TABLE,
+    _LINE,
 )  # fmt: skip
 """The signature of `CompiledPlant.run`, the same for every library: compiled code can call it by a pointer."""
 
 
 class CompiledPlant:
-    """The compiled functions of one library (`rhs`, `run`, `run_many`, `track`) and the layout of their arrays."""
+    """The compiled functions of one library (`rhs`, `run`, `run_many`, `prime`) and the layout of their arrays."""
 
     def __init__(self, library: Library) -> None:
         self.layout = Layout(library)
@@ -36,7 +38,7 @@ class CompiledPlant:
         self.rhs: Callable = self.module.rhs
         self.run: Callable = self.module.run
         self.run_many: Callable = self.module.run_many
-        self.track: Callable = self.module.track
+        self.prime: Callable = self.module.prime
         self._acting: dict[tuple[str, ...], Acting] = {}
 
     def acting(self, names: tuple[str, ...]) -> Acting:
@@ -64,7 +66,7 @@ def _load(library: Library) -> ModuleType:
 @lru_cache(maxsize=512)
 def _inner(function: Callable) -> Callable:
     """An effect's function, compiled once for all libraries that have it."""
-    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True)(function)
 
 
 def _complaint(library: Library, error: Exception) -> str:

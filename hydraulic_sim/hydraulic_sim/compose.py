@@ -179,9 +179,13 @@ class Writer:
                 ]
         return "\n".join([*lines, "parts = 2 if cut > 0.0 else 1"])
 
+    def switch(self, slot: str) -> str:
+        """The flag of a stage."""
+        return f"any_{slot} = {self._any_on(self.members(slot))}"
+
     def switches(self) -> str:
         """One flag per stage, so that a stage without effects costs one test."""
-        lines = [f"any_{name} = {self._any_on(self.members(name))}" for name in slots.SLOTS]
+        lines = [self.switch(name) for name in slots.SLOTS]
         lines.append(f"any_dynamics = {self._any_on(e for e in self.layout.library.values() if e.states)}")
         dry = [
             f"(on[{self.layout.effects[e.name]}] != 0 and ({self._acts(e)}))"
@@ -201,8 +205,9 @@ class Writer:
         return "\n".join(lines)
 
     def _any_on(self, effects: Iterable[Effect]) -> str:
-        """The test that any of them is on."""
-        return " or ".join(f"on[{self.layout.effects[e.name]}] != 0" for e in effects) or "False"
+        """The test that any of them is on: a sum, as a branch for each would take long to compile."""
+        switches = " + ".join(f"on[{self.layout.effects[e.name]}]" for e in effects)
+        return f"{switches} != 0" if switches else "False"
 
     def _acts(self, effect: Effect) -> str:
         """The test that an effect is not at its null value."""
@@ -239,6 +244,8 @@ def places(layout: Layout) -> dict[str, object]:
     return {
         "stick": stick, "n_rates": layout.n_rates, "n_states": len(layout.states), "n_outputs": len(base.OUTPUTS),
         "constants1": w.constants(), "switches1": w.switches(), "moving1": w.moving(), "rhs1": rhs, "rhs4": rhs,
+        "switch_command": w.switch("command"), "drive_limit": w.parameter("drive_limit"),
+        "area_ratio": f"{w.parameter('piston_area_b')} / {w.parameter('piston_area_a')}",
         "bend": REVERSAL_BEND, "shorter": REVERSAL_STEP, "most": MOST_SUBSTEPS,
         "command": shared["command"], "cut1": w.cut(),
         "position_sensor": shared["position_sensor"], "pressure_sensor": shared["pressure_sensor"],

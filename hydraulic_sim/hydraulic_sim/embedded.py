@@ -19,9 +19,10 @@ POSITION, VELOCITY, PRESSURE_A, PRESSURE_B, TRUE_POSITION = (
 class Embedded(NamedTuple):
     """A compiled plant as another compiled function calls it.
 
-    ``run(u, dt, start, longest_step, turn, on, parameters, hydraulic, x, memory, out, failure)`` integrates the drive
-    u (N,) [V] and fills out (N, outputs); it returns how many samples it could follow. Everything but u, dt [s],
-    start [s], the state (x, memory), out and failure (2,) is here.
+    ``run(u, dt, start, out, 0, longest_step, turn, on, parameters, hydraulic, x, memory, out, failure)`` integrates
+    the drive u (N,) [V] and fills out (N, outputs); it returns how many samples it could follow. Everything but u,
+    dt [s], start [s], the state (x, memory), out and failure (2,) is here. The first out and the 0 say that nothing
+    that was measured corrects the state.
     """
 
     run: Callable

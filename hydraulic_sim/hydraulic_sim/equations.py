@@ -90,9 +90,10 @@ from hydraulic_sim.kernels import beyond_whole, clamp, orifice_gain
 # Arrays are copied element by element: a copy of whole arrays has numba compile the message for those that do not fit.
 NR = {n_rates}
 NX = {n_states}
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "no_rewrites": True}  # nothing here is of arrays
 
 
-@njit("f8(f8, f8, f8, f8)", cache=True, error_model="numpy")
+@njit("f8(f8, f8, f8, f8)", **OPTIONS)
 def relax(start, rate, goal, span):
     if rate == 0.0:
         return start
@@ -103,8 +104,7 @@ def relax(start, rate, goal, span):
     return goal + (start - goal) / growth
 
 
-@njit("void(f8, f8[::1], f8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[::1], f8[::1])",
-      cache=True, nogil=True, error_model="numpy")
+@njit("void(f8, f8[::1], f8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[::1], f8[::1])", **OPTIONS)
 def rhs(now, S, command, on, P, hydraulic, K, R, G, AUX):
     {constants1}
     {switches1}
@@ -114,7 +114,7 @@ def rhs(now, S, command, on, P, hydraulic, K, R, G, AUX):
     AUX[9] = direction; AUX[10] = pressure_tank
 
 
-@njit("void(f8[::1], f8[:, ::1], i8)", cache=True, nogil=True, error_model="numpy")
+@njit("void(f8[::1], f8[:, ::1], i8)", **OPTIONS)
 def correct(X, seen, k):
     """Sets the first states to what was seen of them at a sample."""
     for j in range(seen.shape[1]):
@@ -122,9 +122,8 @@ def correct(X, seen, k):
             X[j] = seen[k, j]
 
 
-@njit("i8(f8[::1], f8, f8, f8[:, ::1], i8, f8, f8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1], f8[::1])",
-      cache=True, nogil=True, error_model="numpy")
-def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
+@njit(RUN, **OPTIONS)
+def run(drive, dt, start, seen, every, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
     """Integrates X over len(drive) samples; Y[k] is what is seen at sample k. Returns the samples done.
 
     Every so many samples, if any, the first states are set to what was seen of them; then Y is one row, written anew.
@@ -221,17 +220,11 @@ def integrate(drive, dt, start, seen, every, max_step, max_turn, on, P, hydrauli
     return len(drive)
 
 
-@njit(RUN, cache=True, nogil=True, error_model="numpy")
-def run(drive, dt, start, max_step, max_turn, on, P, hydraulic, X, M, Y, failure):
-    """As `integrate`, with nothing that was seen."""
-    return integrate(drive, dt, start, Y[:0], 0, max_step, max_turn, on, P, hydraulic, X, M, Y, failure)
-
-
-@njit("void(f8[::1], f8, f8, u1[::1], f8[::1], f8[::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
+@njit("void(f8[::1], f8, f8, u1[::1], f8[::1], f8[::1], f8[::1])", **OPTIONS)
 def prime(drive, dt, start, on, P, X, M):
     """Lets the memories of the command effects see a drive of the past; nothing moves."""
-    {constants1}
-    {switches1}
+    drive_limit = {drive_limit}; area_ratio = {area_ratio}
+    {switch_command}
     position = X[0]; velocity = X[1]; pressure_a = X[2]; pressure_b = X[3]
     pressure_difference = pressure_a - pressure_b
     load_pressure = pressure_a - pressure_b * area_ratio
@@ -246,7 +239,7 @@ def prime(drive, dt, start, on, P, X, M):
                 {command}
 
 
-@njit("void(f8, f8[::1], f8, f8, u1[::1], f8[::1], u1)", cache=True, nogil=True, error_model="numpy")
+@njit("void(f8, f8[::1], f8, f8, u1[::1], f8[::1], u1)", **OPTIONS)
 def bend(now, X, acceleration, command, on, P, hydraulic):
     """Bends the bristles so that dry friction lets the piston accelerate like this, as far as it can."""
     S = X.copy(); K = np.zeros(NR); R = np.zeros(NX - NR); G = np.zeros(NX - NR); AUX = np.zeros(11)
@@ -276,13 +269,13 @@ def bend(now, X, acceleration, command, on, P, hydraulic):
 
 
 @njit("i8(f8[::1], f8, f8, f8, i8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[::1], u1[::1], f8[::1], u1, i8[::1],"
-      " f8[:, :, ::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
+      " f8[:, :, ::1], f8[::1])", **OPTIONS)
 def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memories, turning, on, P, hydraulic, wanted,
              found, failure):
     """Runs ``count`` samples from each start, the memories primed over ``past`` samples. Returns the starts done.
 
     ``found`` takes the ``wanted`` columns of what is seen."""
-    {constants1}
+    drive_limit = {drive_limit}
     X = np.empty(NX)
     Y = np.empty((count, {n_outputs}))
     M = np.empty(memories.shape[1])
@@ -298,40 +291,12 @@ def run_many(drive, dt, max_step, max_turn, starts, count, past, states, memorie
         if turning[i] == turning[i]:
             bend(first * dt, X, turning[i], clamp(drive[first] / drive_limit, -1.0, 1.0), on, P, hydraulic)
         ahead = drive[first:first + count]
-        done = run(ahead, dt, first * dt, max_step, max_turn, on, P, hydraulic, X, M, Y, failure)
+        done = run(ahead, dt, first * dt, Y, 0, max_step, max_turn, on, P, hydraulic, X, M, Y, failure)
         own = found[i]
         for k in range(count):
             for j in range(len(wanted)):
                 own[k, j] = Y[k, wanted[j]]
         if done < count:
             return i
-    return len(starts)
-
-
-@njit("i8(f8[::1], f8, f8, f8, f8[:, ::1], i8, i8[::1], i8, i8, u1[::1], f8[::1], u1, f8[::1], f8[::1], f8[:, ::1],"
-      " f8[:, ::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
-def track(drive, dt, max_step, max_turn, seen, every, starts, run_up, past, on, P, hydraulic, X, M, states, memories,
-          failure):
-    """Runs along ``drive``, set every so many samples to what is seen of the first states; keeps X and M at starts.
-
-    What lies more than ``run_up`` samples before a start, and after the one before, is left out; memories of the drive
-    are primed over ``past`` samples of that."""
-    Y = np.empty((1, {n_outputs}))
-    k = 0
-    for i in range(len(starts)):
-        first = k + max(starts[i] - run_up - k, 0) // every * every
-        if first > k:
-            before = max(first - past, k)
-            prime(drive[before:first], dt, before * dt, on, P, X, M)
-        k = starts[i]
-        done = integrate(drive[first:k], dt, first * dt, seen[first:k], every, max_step, max_turn, on, P, hydraulic, X,
-                         M, Y, failure)
-        if done < k - first:
-            return i
-        correct(X, seen, k)
-        for j in range(len(X)):
-            states[i, j] = X[j]
-        for j in range(len(M)):
-            memories[i, j] = M[j]
     return len(starts)
 '''

@@ -410,14 +410,21 @@ class Plant:
         states, memories = np.empty((len(first), x.size)), np.empty((len(first), memory.size))
         past = len(u) if self.lasting_memories and self.drive_path is not None else LONGEST_MEMORY
         run_up = len(u) if run_up is None else run_up
-        done = self._compiled.track(
-            u, dt, self.longest_step, self._turn, measured, CORRECTED_EVERY, first, run_up, past, self._on,
-            self._parameters, self._hydraulic, x, memory, states, memories, failure,
-        )  # fmt: skip
-        if done < len(first):
-            sample = min(max(int(failure[0] / dt + 1e-6), 0), len(u) - 1)
-            where = _named(self.layout.states, x)
-            raise SimulationError(f"propagation along the record failed at sample {sample}; state reached: {where}")
+        out, done = np.empty((1, len(base.OUTPUTS))), 0
+        for i, until in enumerate(first.tolist()):
+            begins = done + max(until - run_up - done, 0) // CORRECTED_EVERY * CORRECTED_EVERY
+            if begins > done:
+                before = max(begins - past, done)
+                self._compiled.prime(u[before:begins], dt, before * dt, self._on, self._parameters, x, memory)
+            reached = begins + self._compiled.run(
+                u[begins:until], dt, begins * dt, measured[begins:until], CORRECTED_EVERY, self.longest_step,
+                self._turn, self._on, self._parameters, self._hydraulic, x, memory, out, failure,
+            )  # fmt: skip
+            if reached < until:
+                state = _named(self.layout.states, x)
+                raise SimulationError(f"propagation along the record failed at sample {reached}; state: {state}")
+            x[:4] = np.where(np.isnan(measured[until]), x[:4], measured[until])
+            states[i], memories[i], done = x, memory, until
         for name, place in self.layout.memories.items():
             if self.layout.library[name].slot.endswith("_sensor"):
                 memories[:, place] = 0.0
@@ -470,8 +477,8 @@ class Plant:
         self._check_dt(dt)
         failure = np.zeros(2)
         done = self._compiled.run(
-            u, dt, start, self.longest_step, self._turn, self._on, self._parameters, self._hydraulic, x, memory, out,
-            failure,
+            u, dt, start, out, 0, self.longest_step, self._turn, self._on, self._parameters, self._hydraulic, x, memory,
+            out, failure,
         )  # fmt: skip
         if done < len(u):
             seen, where = _named(base.OUTPUTS, out[done]), _named(self.layout.states, x)

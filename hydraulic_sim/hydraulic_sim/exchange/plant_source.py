@@ -73,9 +73,9 @@ def plant_source(model: Model, rate: float) -> PlantSource:
     known |= {"hydraulic": float(model.kind == "hydraulic"), "seen": 0.0, "every": 0.0}  # nothing is seen of it
     scope |= {"NX": len(layout.states), "NR": layout.n_rates}
     module = compose.write_module(layout.library)
-    for name, python, text in (("relax", "relax", module), ("run", "integrate", module), ("see", "see", _see(layout))):
+    for name, text in (("relax", module), ("run", module), ("see", _see(layout))):
         result = "long" if name == "run" else "double"
-        tree = tree_of(text, python)
+        tree = tree_of(text, name)
         # The memories are an array also where no effect has any.
         arrays = arrays_of(tree, scope) | {a.arg for a in tree.args.args if a.arg == "M"}
         returns = 0 if name == "see" else 1
