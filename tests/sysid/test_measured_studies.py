@@ -12,6 +12,7 @@ from measured.study import StudyError, data_folder
 
 STUDIES = measured_studies.studies()
 SHIPPED = sorted(name for name, study in STUDIES.items() if study.EXCERPT is not None)
+SHORT = "mts"  # the others, which take a minute each, are thorough
 MOST = 1_000_000  # bytes of an excerpt
 
 
@@ -26,7 +27,10 @@ def test_a_shipped_excerpt_is_small_and_says_whose_it_is(name: str) -> None:
     assert {"LICENSE", "README.md"} <= {path.name for path in files}
 
 
-@pytest.fixture(scope="module", params=SHIPPED)
+STUDIED = [name if name == SHORT else pytest.param(name, marks=pytest.mark.thorough) for name in SHIPPED]
+
+
+@pytest.fixture(scope="module", params=STUDIED)
 def studied(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path, int]:
     """Name of a set, the folder of the results, and the exit code of the command."""
     out = tmp_path_factory.mktemp(request.param)
