@@ -188,12 +188,25 @@ def test_a_delay_that_the_noise_hides_asks_for_no_other_judgement(model: Model) 
         assert not retimed(split_, late(split_, 0.01 * DT))
 
 
+class Matters(SearchState):
+    """What it leaves is something to somebody, …"""
+
+    immaterial = False  # type: ignore[assignment]
+
+
+class Nothing(SearchState):
+    """… or to nobody."""
+
+    immaterial = True  # type: ignore[assignment]
+
+
 class OneWrongNumber(DataSheetFits):
     """A search whose fits are known: an area is off, or friction leaves ``less`` of the squares instead."""
 
-    def __init__(self, model: Model, less: float, agreed: bool = True) -> None:
+    def __init__(self, model: Model, less: float, agreed: bool = True, matters: bool = True) -> None:
         def state(model: Model, squares: float) -> SearchState:
-            return SearchState(model, cast(Linearisation, None), Misfit(squares, 0.0, 40_000, 0), [])
+            kind = Matters if matters else Nothing
+            return kind(model, cast(Linearisation, None), Misfit(squares, 0.0, 40_000, 0), [])
 
         self.agreed = agreed
         self.strict, self.loose = state(model, 48_000.0), state(model, 39_500.0)
@@ -243,6 +256,16 @@ def test_an_effect_that_leaves_less_than_the_whole_data_sheet_is_the_verdict(mod
     assert OneWrongNumber(model, less=400.0).named == (["friction_asymmetry"], [])
     assert OneWrongNumber(model, less=40.0).named == ([], ["piston_area_b"])  # it may be either
     assert OneWrongNumber(model, less=400.0, agreed=False).named == ([], ["piston_area_b"])
+
+
+def test_where_what_is_left_is_nothing_to_anybody_no_number_is_wrong_that_leaves_much_of_it(model: Model) -> None:
+    """Sensors without noise show how far the laws of the model are right."""
+    fits = OneWrongNumber(model, less=-900.0, matters=False)
+    strict, fits.loose = fits.strict, replace(fits.loose, misfit=fits.strict.misfit.times(0.9))
+    assert strict.misfit.variance > CRITERIA.little**2
+    assert fits.named == ([], [])
+    fits.loose = replace(fits.loose, misfit=strict.misfit.times(0.84))  # 1.008 × the noise
+    assert fits.named == ([], ["piston_area_b"])
 
 
 def test_what_effects_may_stand_for_follows_from_the_sensitivities(model: Model) -> None:

@@ -112,13 +112,12 @@ class Shooting:
         return self.residuals(plant, [self._laid_out(plant, states) for states in initial_states])
 
     def _laid_out(self, plant: Plant, states: Array) -> Array:
-        """These states (S, n_states) as another plant has them, whose library may have effects with more."""
+        """These states (S, n_states) as another plant has them, of a library with other effects that are off."""
         own = self.plant.state_names
         if plant.state_names == own:
             return states
-        other = np.zeros((len(states), len(plant.state_names)))
-        other[:, [plant.state_names.index(name) for name in own]] = states
-        return other
+        column = {name: states[:, i] for i, name in enumerate(own)}
+        return np.column_stack([column.get(name, np.zeros(len(states))) for name in plant.state_names])
 
     def residuals(self, plant: Plant, initial_states: Sequence[Array]) -> list[Array]:
         """(S, m) per record: measured − simulated over the noise, the priors of the initial states appended."""

@@ -81,7 +81,7 @@ def play(run, longest, turn, on, parameters, hydraulic, x, memory, plan, dt, lim
         drive[i] = min(max(u[0], -limit), limit)
         u[0] = drive[i]
         now = out[i : i + 1]
-        if run(u, dt, i * dt, longest, turn, on, parameters, hydraulic, x, memory, now, failure) < 1:
+        if run(u, dt, i * dt, now, 0, longest, turn, on, parameters, hydraulic, x, memory, now, failure) < 1:
             return i, LOST
         position = now[0, POSITION] + seen[i]
         if resolution > 0.0:

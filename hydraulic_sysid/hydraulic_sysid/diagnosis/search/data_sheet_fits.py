@@ -25,7 +25,7 @@ from .search_state import SearchResult, SearchState, new_effect
 from .spectral_lines import record_features
 from .stand_ins import StandIns
 from .uncertainty import parameter_errors
-from .worth import borrowed, nothing_gained
+from .worth import borrowed, leaves_most, nothing_gained
 
 NO_STARTS: Mapping[str, Mapping[str, float]] = {}
 
@@ -65,6 +65,9 @@ class DataSheetFits(CandidateFits):
         if self._strict(base):
             return found
         strict = replace(self.with_moved(base, ()), refits=base.refits, scores=base.scores)
+        shown = not found.added and not strict.misfit.little
+        if shown and leaves_most(strict.misfit, final.misfit, strict.immaterial):  # that is how far laws are off
+            return replace(found, base=strict, final=strict)
         done, moved = self.fewest_moved(final, strict if final is base else None)
         stand_ins = self.stand_ins(done, moved) if moved and (others or not found.added) else None
         tried = stand_ins.sets(done.misfit.freedom)[: CRITERIA.most_sets] if stand_ins is not None and others else []

@@ -117,10 +117,12 @@ def places_with_memory(
 
 
 def _extended(at: Linearisation, files: Sequence[Path], say: Callable[[str], None]) -> Iterator[tuple[Plant, Effect]]:
-    """The plant with each of these effects at the values of the fit, where it takes them."""
-    model = replace(
-        at.model, user_effects=(*at.model.user_effects, *(f for f in files if f not in at.model.user_effects))
-    )
+    """The plant with each of these effects at the values of the fit, where it takes them.
+
+    Of the library it has what is on: all of it would take long to compile.
+    """
+    others = (f for f in files if f not in at.model.user_effects)
+    model = replace(at.model, user_effects=(*at.model.user_effects, *others), lean=True)
     for file in files:
         try:
             extended = model.with_effect(file.stem)
