@@ -163,7 +163,7 @@ def test_lifecycle_live_gains_and_stale_states(plant: Any, node: Any, client: An
 @pytest.mark.parametrize(
     "effects",
     [
-        "{valve_deadband: {width: 0.02}}",
+        pytest.param("{valve_deadband: {width: 0.02}}", marks=pytest.mark.thorough),
         pytest.param("{supply_droop: {resistance: 4.0e9, time: 0.1}}", marks=pytest.mark.thorough),
     ],
     ids=["deadband", "droop"],

@@ -116,6 +116,7 @@ def test_a_wrong_supply_pressure_is_a_matter_of_the_data_sheet(model: Model) -> 
     assert "supply_pressure is" in found["verdict"]["text"]
 
 
+@pytest.mark.thorough
 def test_areas_that_say_the_same_are_both_named(model: Model) -> None:
     """With valve flow, mass and friction free a larger area of one side is a smaller one of the other."""
     for key in ("moving_mass", "bulk_modulus", "coulomb_friction.level", "internal_leakage.coefficient"):

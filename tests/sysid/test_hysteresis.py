@@ -101,6 +101,7 @@ def test_a_force_that_answers_late_is_proposed_with_its_lag(model: Model, record
     assert joined.model.value("late.lag") == pytest.approx(LAG, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_forces_ask_for_the_values_beside_a_law(model: Model, records: list[Record], tmp_path: Path) -> None:
     """Friction without the law is far from what it is beside it, and nothing is simulated to see that."""
     file = tmp_path / "known.py"

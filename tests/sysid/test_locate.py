@@ -79,7 +79,7 @@ FAULTS = {
 }
 
 
-THOROUGH = ("stribeck_friction", "command_delay", "sensor_lag")  # another one of their subsystems is always looked for
+THOROUGH = ("stribeck_friction", "command_delay", "sensor_lag", "hose_compliance")  # like ones are always looked for
 
 
 @pytest.mark.parametrize(
@@ -123,6 +123,7 @@ def test_fault_that_no_effect_of_the_library_makes(model: Model) -> None:
     assert continuity["ratio"] > 5.0
 
 
+@pytest.mark.thorough
 def test_measured_spool_and_supply_have_balances_of_their_own(model: Model) -> None:
     plant = model.with_effect("spool_dynamics", {"frequency": 40.0})
     records = [record_of(plant, seed, (*MEASURED, "spool", "pressure_supply")) for seed in (10, 11)]

@@ -45,6 +45,7 @@ def test_the_hidden_dead_band_is_found_and_its_width_too(run: Path) -> None:
     assert set(found["noise_std"]) == {"position", "pressure_a", "pressure_b"}
 
 
+@pytest.mark.thorough
 def test_a_quick_look_at_a_part_of_the_records_finds_it_too(run: Path, tmp_path: Path) -> None:
     assert diagnose_main(["--model", "sample_bench", "--record", str(RECORDS), "--quick", "--out", str(tmp_path)]) == 0
     whole, quick = (json.loads((folder / "diagnose.json").read_text()) for folder in (run, tmp_path))
