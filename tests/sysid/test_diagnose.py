@@ -365,11 +365,9 @@ def test_what_is_left_beside_an_effect_in_one_role_alone_is_shared_out_once(
     for name, stub in stubs.items():
         monkeypatch.setattr(search, name, stub, raising=False)
     monkeypatch.setattr("hydraulic_sysid.diagnosis.search.search.borrowed", lambda *_: False)
-    base, forward = state(model, 60000.0, {}), search.forward
-    if first:  # the search goes on from the model without it, its faults and candidates looked for anew
-        monkeypatch.setattr(search, "forward", lambda base: "forward")
-    assert forward(base) == ("forward" if first else "onward")
-    assert again == [anew[0] if first else anew[1]]
+    base = state(model, 60000.0, {})
+    assert search.forward(base) == "onward"
+    assert again == [anew[1]], "what was found first stays, fitted anew"
     assert asked == ([one] if first else [one, two])
     asked.clear()
 
@@ -378,7 +376,7 @@ def test_what_is_left_beside_an_effect_in_one_role_alone_is_shared_out_once(
 
     monkeypatch.setattr(search, "share_of_a_curve", goes_on, raising=False)
     with pytest.raises(LookupError):
-        forward(base)
+        search.forward(base)
     assert asked == [], "once"
 
 

@@ -383,20 +383,21 @@ class Search(RecordingFits):
     def begun_elsewhere(
         self, base: SearchState, before: SearchState, better: SearchState, alone: bool
     ) -> SearchResult | None:
-        """The search anew, where what a ``better`` state shows asks for that: of the model, or of the segments' roles.
+        """The search anew, where what a ``better`` state shows asks for that: from another model, or with other roles.
 
         ``alone``: whether the gain of its effect over the state ``before`` is its own.
         """
         first = not new_effects(before, base)
         plain = self.led_on(base, better, alone) if first else None
+        if plain is not None:
+            return self.forward(self.recorded(plain))
         # What is left beside an effect may be nearly all where nothing was fitted.
         shares = alone and not (better.misfit.at_the_noise or self._shared_beside)
-        if plain is None and shares and self.shared_out(better):
-            self._shared_beside = True
-            plain = self.state(before.model, self._last)
-        if plain is None:
+        if not shares or not self.shared_out(better):
             return None
-        return self.forward(self.recorded(plain)) if first else self.onward(base, base.model, plain)
+        self._shared_beside = True
+        known = self.state(better.model if first else before.model, self._last)
+        return self.onward(base, base.model, self.judged_anew(known) or known)
 
     def led_on(self, base: SearchState, better: SearchState, alone: bool) -> SearchState | None:
         """The model without the effect of a ``better`` state, where that only led its fit out of a local minimum."""
